@@ -13,7 +13,7 @@ using namespace internal;
 
 namespace {
 
-constexpr std::uint32_t kStateVersion = 5;
+constexpr std::uint32_t kStateVersion = 6;
 
 }  // namespace
 
@@ -54,6 +54,8 @@ struct Localizer::State {
     return std::numeric_limits<double>::infinity();  // map constraints come irregularly
   }
 
+  LocalizationEstimate estimate_of(const ErrorStateFilter& state) const;
+
   LocalizationOptions options;
   ReplayFilter filter;
   std::array<RefusalCounts, kLocalizationSensors> refusals;
@@ -90,20 +92,30 @@ bool Localizer::reaches(Stamp stamp) const {
 }
 
 LocalizationEstimate Localizer::estimate() const {
-  const FilterMemory& m = state_->filter.filter().memory();
+  return state_->estimate_of(state_->filter.filter());
+}
+
+std::optional<LocalizationEstimate> Localizer::estimate_at(Stamp stamp) const {
+  const auto filter = state_->filter.at(stamp);
+  if (!filter) return std::nullopt;
+  return state_->estimate_of(*filter);
+}
+
+LocalizationEstimate Localizer::State::estimate_of(const ErrorStateFilter& state) const {
+  const FilterMemory& m = state.memory();
   const NavigationState& s = m.estimate.state;
   const ErrorCovariance& p = m.estimate.covariance;
   LocalizationEstimate e;
   e.stamp = m.stamp;
-  e.world_from_body = state_->filter.filter().world_from_body();
-  e.odom_from_body = state_->filter.filter().odom_from_body();
+  e.world_from_body = state.world_from_body();
+  e.odom_from_body = state.odom_from_body();
   e.world_from_odom = m.world_from_odom;
   // v = R w, δv = R (ν − [w]× φ).
   const Eigen::Matrix3d rotation = s.world_from_body.rotation_matrix();
   Eigen::Matrix<double, 3, 6> by_attitude_and_velocity;
   by_attitude_and_velocity << -rotation * skew(s.velocity_m_s), rotation;
   static_assert(error_at::kVelocity == error_at::kAttitude + 3);
-  e.velocity_m_s = state_->filter.filter().velocity();
+  e.velocity_m_s = state.velocity();
   e.velocity_covariance = by_attitude_and_velocity * p.block<6, 6>(error_at::kAttitude, error_at::kAttitude) *
                           by_attitude_and_velocity.transpose();
   e.biases = {s.gyro_bias_rad_s, p.diagonal().segment<3>(error_at::kGyroBias).cwiseSqrt(), s.accel_bias_m_s2,
@@ -118,7 +130,9 @@ LocalizationEstimate Localizer::estimate() const {
   e.up_in_world = true_up(s.gravity_tilt_rad);
   for (std::size_t i = 0; i < e.health.size(); ++i) {
     const auto sensor = static_cast<LocalizationSensor>(i);
-    e.health[i] = m.monitors[i].report(m.stamp, state_->timeout_s(sensor), state_->refusals[i]);
+    RefusalCounts refused = refusals[i];
+    if (sensor == LocalizationSensor::vision) refused.too_early += filter.undone_leaps();
+    e.health[i] = m.monitors[i].report(m.stamp, timeout_s(sensor), refused);
   }
   return e;
 }

@@ -239,6 +239,9 @@ class Localizer {
 
   /// Estimate at the newest sample; identity before the start.
   LocalizationEstimate estimate() const;
+  /// Estimate at a time of the buffer by the samples up to it, or predicted for a later time. Nothing before the
+  /// buffer.
+  std::optional<LocalizationEstimate> estimate_at(Stamp stamp) const;
 
   /// The memory as a versioned value; after restore() all further estimates are the same, bit for bit. Code
   /// `configuration` where the bytes are of another version, `store_damaged` where they are damaged.

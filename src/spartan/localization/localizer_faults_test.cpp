@@ -321,7 +321,7 @@ TEST(LocalizerFaults, AStampFarAheadIsRefusedAlone) {
   EXPECT_EQ(e.health_of(LocalizationSensor::compass).refused.too_early, 1);
   EXPECT_EQ(e.health_of(LocalizationSensor::compass).refused.too_late, 1);
   EXPECT_EQ(e.world_from_body.pose.matrix(), expected.world_from_body.pose.matrix());
-  // A frame may advance the time that far.
+  // A frame may advance the time that far, if the next sample confirms it.
   EXPECT_TRUE(localizer.add(RelativeMotion{test_stamp(42.5), test_stamp(4000), {}, Matrix6d::Identity(), false}));
   EXPECT_TRUE(localizer.add(WheelSample{test_stamp(4000.1), 1, 1}));
 }

@@ -109,6 +109,12 @@ void Pipeline::State::advance(const RectifiedPair& rectified, const MotionEstima
   if (!motion.keeps_reference) reference = {motion.to, world_from_left, left_from_body, {}};
 }
 
+// At the time of a frame: live, newer samples of other sensors come before it.
+LocalizationEstimate Pipeline::State::localized_at(Stamp stamp) const {
+  const auto estimate = localizer.estimate_at(stamp);
+  return estimate ? *estimate : localizer.estimate();
+}
+
 // The odometry alone needs sensor samples only to initialize the world frame.
 void Pipeline::State::add_sensor_sample(const Measurement& sample) {
   if (!options.odometry_only || !started) localizer.add(sample);
@@ -269,7 +275,7 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
     result.world_from_body.covariance = s.dead_reckoning.covariance();
   } else {
     result.world_from_body.covariance = s.odometry_filter.world_from_body().covariance;
-    result.localization = s.localizer.estimate();
+    result.localization = s.localized_at(rectified->stamp);
     if (!result.motion.keeps_reference) s.reference.odom_from_body = result.localization->odom_from_body.pose;
     result.slam = s.slam_filter.world_from_body();
   }

@@ -34,7 +34,7 @@ Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const Recti
   const bool begins = frame.position_id != stop_stage.position_id();
   if (begins && !has_both_images(rectified)) return {};
   return stop_stage.add_odometry_frame(frame.position_id, rectified, pair.nearest_m,
-                                       localizer.estimate().world_from_body, motion);
+                                       localized_at(rectified.stamp).world_from_body, motion);
 }
 
 // Adds a frame of another pair to the stop that it belongs to.
@@ -119,7 +119,7 @@ void Pipeline::State::update_keyframes(const RectifiedPair& rectified, const Mot
   if (keyframe_stage.is_pending()) {
     keyframe_stage.hurry();
   } else {
-    keyframe_stage.begin(rectified, world_from_left, localizer.estimate().world_from_body, body_motion);
+    keyframe_stage.begin(rectified, world_from_left, localized_at(rectified.stamp).world_from_body, body_motion);
   }
 }
 

@@ -45,6 +45,9 @@ class ErrorStateFilter {
   /// Measurements must be processed in the order of comes_before().
   void process(const Measurement& measurement);
 
+  /// Propagates to a time that is not earlier than that of the memory.
+  void predict_to(Stamp stamp) { propagate_to(stamp, nullptr); }
+
   const FilterMemory& memory() const { return memory_; }
   void set_memory(const FilterMemory& memory) { memory_ = memory; }
 

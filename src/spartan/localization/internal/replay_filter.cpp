@@ -163,6 +163,7 @@ std::optional<Refusal> ReplayFilter::add_before_start(const Measurement& m) {
 
 std::optional<Refusal> ReplayFilter::add_started(const Measurement& m) {
   const Stamp stamp = stamp_of_measurement(m);
+  undo_leap(stamp);
   if (!reaches(stamp)) {
     const auto* constraint = std::get_if<PoseConstraint>(&m);
     if (constraint == nullptr || stamp != filter_.memory().vision.clone_stamp) return Refusal::too_late;
@@ -171,10 +172,25 @@ std::optional<Refusal> ReplayFilter::add_started(const Measurement& m) {
     return insert(LateConstraint{{newest_.ns - buffer_ns}, *constraint});
   }
   // It would make all other samples too late. Only vision, the required sensor, may advance the time that far.
-  if (seconds_between(newest_, stamp) > std::max(options_.buffer_s, kMinLead_s) &&
-      !std::holds_alternative<RelativeMotion>(m))
+  if (seconds_between(newest_, stamp) > lead_s() && !std::holds_alternative<RelativeMotion>(m))
     return Refusal::too_early;
   return insert(m);
+}
+
+double ReplayFilter::lead_s() const {
+  return std::max(options_.buffer_s, kMinLead_s);
+}
+
+/// A frame far ahead was a wrong stamp if the next sample is from before: it is removed.
+void ReplayFilter::undo_leap(Stamp arrived) {
+  if (!before_leap_) return;
+  const Stamp before = *before_leap_;
+  before_leap_.reset();
+  if (seconds_between(before, arrived) > lead_s()) return;
+  entries_.pop_back();
+  newest_ = before;
+  ++undone_leaps_;
+  replay_from(entries_.size());
 }
 
 std::optional<std::size_t> ReplayFilter::place(const Measurement& m) {
@@ -188,6 +204,7 @@ std::optional<std::size_t> ReplayFilter::place(const Measurement& m) {
 std::optional<Refusal> ReplayFilter::insert(const Measurement& m) {
   const auto at = place(m);
   if (!at) return Refusal::duplicate;
+  if (seconds_between(newest_, stamp_of_measurement(m)) > lead_s()) before_leap_ = newest_;
   newest_ = std::max(newest_, stamp_of_measurement(m));
   if (*at + 1 == entries_.size()) {
     run_from(*at);
@@ -201,6 +218,21 @@ std::optional<Refusal> ReplayFilter::insert(const Measurement& m) {
 bool ReplayFilter::opens_cell(std::size_t entry) const {
   if (entry == 0) return false;
   return cell_of(stamp_of_measurement(entries_[entry])) != cell_of(stamp_of_measurement(entries_[entry - 1]));
+}
+
+std::optional<ErrorStateFilter> ReplayFilter::at(Stamp stamp) const {
+  if (!started() || stamp < snapshots_.front().memory.stamp) return std::nullopt;
+  ErrorStateFilter filter = filter_;
+  if (stamp < filter_.memory().stamp) {
+    const auto later = std::partition_point(snapshots_.begin() + 1, snapshots_.end(),
+                                            [&](const Snapshot& s) { return s.memory.stamp <= stamp; });
+    const Snapshot& from = *(later - 1);
+    filter.set_memory(from.memory);
+    for (std::size_t i = from.count; i < entries_.size() && stamp_of_measurement(entries_[i]) <= stamp; ++i)
+      filter.process(entries_[i]);
+  }
+  filter.predict_to(stamp);
+  return filter;
 }
 
 void ReplayFilter::replay_from(std::size_t entry) {
@@ -220,6 +252,7 @@ void ReplayFilter::run_from(std::size_t entry) {
 
 /// Discards snapshots and entries that are older than any sample that is still accepted.
 void ReplayFilter::discard_old() {
+  if (before_leap_) return;  // they are needed if it is undone
   std::size_t first = 0;
   while (first + 1 < snapshots_.size() &&
          seconds_between(snapshots_[first + 1].memory.stamp, newest_) > options_.buffer_s)
@@ -235,6 +268,9 @@ void ReplayFilter::put(ArchiveWriter& out) const {
   out.put(started());
   out.put(isolated_.has_value());
   out.put(isolated_.value_or(Stamp()).ns);
+  out.put(before_leap_.has_value());
+  out.put(before_leap_.value_or(Stamp()).ns);
+  out.put(undone_leaps_);
   out.put(start_.ns);
   out.put(newest_.ns);
   internal::put(out, started() ? snapshots_.front().memory : FilterMemory{});
@@ -247,6 +283,10 @@ bool ReplayFilter::get(ArchiveReader& in) {
   const bool has_isolated = in.get<bool>();
   isolated_ = in.get_stamp();
   if (!has_isolated) isolated_.reset();
+  const bool has_leap = in.get<bool>();
+  before_leap_ = in.get_stamp();
+  if (!has_leap) before_leap_.reset();
+  undone_leaps_ = in.get<std::int64_t>();
   start_ = in.get_stamp();
   newest_ = in.get_stamp();
   const std::optional<FilterMemory> memory = get_filter_memory(in);

@@ -28,10 +28,16 @@ class ReplayFilter {
   /// buffer.
   std::optional<Refusal> add(const Measurement& measurement);
 
+  /// Frames that were accepted and then removed, because their stamps were far ahead of all later samples.
+  std::int64_t undone_leaps() const { return undone_leaps_; }
+
   /// Whether a sample with that stamp would not be too late; false before the start.
   bool reaches(Stamp stamp) const;
 
   const ErrorStateFilter& filter() const { return filter_; }
+  /// The filter at a time of the buffer, as if later samples had not come; at a later time, its prediction. Nothing
+  /// before the buffer or before the start.
+  std::optional<ErrorStateFilter> at(Stamp stamp) const;
 
   void put(ArchiveWriter& out) const;
   /// Returns false if the bytes are damaged.
@@ -49,6 +55,8 @@ class ReplayFilter {
   /// Inserts into the entries without processing; returns the index, or nothing for a duplicate.
   std::optional<std::size_t> place(const Measurement& measurement);
   std::optional<Refusal> insert(const Measurement& measurement);
+  void undo_leap(Stamp arrived);
+  double lead_s() const;
   bool opens_cell(std::size_t entry) const;
   void replay_from(std::size_t entry);
   void run_from(std::size_t entry);
@@ -60,6 +68,9 @@ class ReplayFilter {
   std::vector<Snapshot> snapshots_;
   Stamp start_, newest_;
   std::optional<Stamp> isolated_;  ///< stamp of the sample before if it was refused as far from all others
+  /// Newest stamp before a frame that is far ahead of it, until another sample confirms that time.
+  std::optional<Stamp> before_leap_;
+  std::int64_t undone_leaps_ = 0;
 };
 
 }  // namespace spartan::internal

@@ -90,6 +90,7 @@ struct Pipeline::State {
   double distance_of_last_terrain_m = -1;
 
   std::size_t index_of(const StereoPair& of) const { return static_cast<std::size_t>(&of - rig.pairs.data()); }
+  LocalizationEstimate localized_at(Stamp stamp) const;
   Status check_new(const StereoFrame& frame, std::size_t pair_index,
                    const internal::FrozenCameras::Fingerprints& images) const;
   void start(const RectifiedPair& rectified);
