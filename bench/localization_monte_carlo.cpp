@@ -1,6 +1,6 @@
 // Monte Carlo test of the localization: `make bench-localization_monte_carlo`.
 //
-//   localization_monte_carlo [--seeds N] [--first SEED] [--threads N] [--tables subsets|faults] [--config FOLDER]
+//   localization_monte_carlo [--seeds N] [--first SEED] [--threads N] [--tables subsets|faults|wild] [--config FOLDER]
 //   [SCENARIO...]
 //
 // The true motion comes from the simulator; for each seed the sensor errors are drawn anew, and the odometry errors
@@ -241,6 +241,49 @@ std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
 // 99.73 % quantile of chi-square with three degrees of freedom, the probability of 3 σ in one dimension.
 constexpr double kThreeSigma = 14.156;
 
+// One visual motion that is wrong by 0.5 m and 5° in random directions, with its usual covariance.
+std::vector<Arrival> with_wild_motion(const TrueDrive& drive, std::uint64_t seed, const Subset& subset) {
+  DrawnDrive d = draw(drive, {}, drive.scenario.compass, seed);
+  Random random(seed, 403);
+  const auto direction = [&] {
+    Eigen::Vector3d v(random.normal(), random.normal(), random.normal());
+    return v.normalized().eval();
+  };
+  Vector6d error;
+  error << 0.5 * direction(), 5 / 57.29578 * direction();
+  RelativeMotion& wild = d.motions[d.motions.size() * 2 / 5];
+  wild.previous_from_current = wild.previous_from_current * exp_se3(error);
+  return arrivals(d, subset);
+}
+
+void print_wild_motions(const TrueDrive& drive, const Seeds& seeds, const ThreadPool& workers) {
+  fmt::print("\n## {}: one wild motion of vision, 0.5 m and 5° ({} seeds)\n\n", drive.scenario.name, seeds.count);
+  fmt::print(
+      "| sensors | inside 3 σ after it, % | at the end, % | error at the end, mm | σ at the end, mm | vision rejected "
+      "| "
+      "IMU rejected |\n|---|---|---|---|---|---|---|\n");
+  for (int mask = 0; mask < 16; ++mask) {
+    const auto trials = run_trials(drive, Subset::of(mask), seeds, with_wild_motion, workers);
+    int after = 0, end = 0;
+    for (const TrialResult& t : trials) {
+      after += t.frames[t.frames.size() * 2 / 5 + 5].nees_position < kThreeSigma ? 1 : 0;
+      end += t.frames.back().nees_position < kThreeSigma ? 1 : 0;
+    }
+    const auto mean = [&](const auto& value) { return mean_of(each(trials, value)).mean; };
+    const auto rejected = [&](LocalizationSensor sensor) {
+      return mean([&](const TrialResult& t) { return static_cast<double>(t.last.health_of(sensor).rejected); });
+    };
+    fmt::print("| {} | {:.0f} | {:.0f} | {:.1f} | {:.1f} | {:.1f} | {:.1f} |\n", Subset::of(mask).name(),
+               100.0 * after / seeds.count, 100.0 * end / seeds.count,
+               mean([](const TrialResult& t) { return 1e3 * t.frames.back().distance_m; }),
+               mean([](const TrialResult& t) {
+                 return 1e3 * std::sqrt(t.last.world_from_body.covariance.diagonal().head<3>().sum());
+               }),
+               rejected(LocalizationSensor::vision), rejected(LocalizationSensor::imu));
+    std::fflush(stdout);
+  }
+}
+
 void print_faults(const TrueDrive& drive, const Seeds& seeds, const ThreadPool& workers) {
   fmt::print("\n## {}: sensor faults, all sensors ({} seeds)\n\n", drive.scenario.name, seeds.count);
   fmt::print(
@@ -282,7 +325,7 @@ void print_faults(const TrueDrive& drive, const Seeds& seeds, const ThreadPool& 
 
 void run(const std::vector<std::string>& words) {
   RecordingArguments arguments = read_arguments(
-      words, {{"--seeds", "30"}, {"--first", "1"}, {"--threads", "2"}, {"--config", "config"}, {"--tables", "both"}});
+      words, {{"--seeds", "30"}, {"--first", "1"}, {"--threads", "2"}, {"--config", "config"}, {"--tables", "all"}});
   if (arguments.scenarios.empty()) arguments.scenarios = {"rocky_20pct", "crater_rim", "loop"};
   const ThreadPool workers(arguments.number("--threads"));
   const Seeds seeds{arguments.number("--first"), arguments.number("--seeds")};
@@ -296,8 +339,9 @@ void run(const std::vector<std::string>& words) {
     if (!drive)
       throw std::runtime_error(fmt::format("{}: no such scenario in {}", name, arguments.options.at("--config")));
     const std::string& tables = arguments.options.at("--tables");
-    if (tables != "faults") print_subsets(*drive, seeds, workers);
-    if (tables != "subsets") print_faults(*drive, seeds, workers);
+    if (tables == "all" || tables == "subsets") print_subsets(*drive, seeds, workers);
+    if (tables == "all" || tables == "faults") print_faults(*drive, seeds, workers);
+    if (tables == "all" || tables == "wild") print_wild_motions(*drive, seeds, workers);
   }
 }
 
