@@ -62,6 +62,7 @@ enum class HealthReason : std::uint8_t {
   out_of_range,  ///< rate or specific force beyond the physical range of a rover
   contradicted,  ///< vision contradicts its prediction
   not_aligned,   ///< its readings fit the visual motions with no biases and gravity
+  wild,          ///< a single motion far from what IMU or wheels say
   outvoted,      ///< vision contradicts the IMU and the wheels, which agree
   lost,          ///< vision could not measure the motion
   never_seen,

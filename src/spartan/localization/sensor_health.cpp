@@ -133,6 +133,9 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
     case HealthReason::not_aligned:
       health.reason = "its readings fit the motions by vision with no biases and direction of gravity";
       break;
+    case HealthReason::wild:
+      health.reason = "its motion contradicts the IMU or the wheels by far";
+      break;
     case HealthReason::outvoted:
       health.reason = fmt::format(
           "contradicts the IMU and the wheels, which agree: NIS {:.1f} above the gate of {:.1f}", nis, limit);

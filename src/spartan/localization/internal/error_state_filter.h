@@ -84,6 +84,9 @@ class ErrorStateFilter {
   bool prediction_contradicted(const Innovation& innovation) const;
   void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
   bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
+  bool is_wild_motion(const VisualMotion& visual, double inertial_nis, double against_prediction) const;
+  std::optional<double> compare_with_wheels(const VisualMotion& visual) const;
+  void accept_doubted_motion();
   std::optional<ForwardComparison> compare_forward(const VisualMotion& visual) const;
   void begin_frame(Stamp stamp);
 

@@ -1,5 +1,6 @@
 // Updates by visual motions between frames.
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 
 #include "spartan/localization/internal/error_state_filter.h"
@@ -24,6 +25,9 @@ constexpr double kConstantSteps = 5000;
 /// The IMU and the wheels agree where they differ by fewer standard deviations; vision is outvoted by them where it
 /// differs from the IMU by as many and from the mean of both by more than kOutvotedSigmas.
 constexpr double kAgreeSigmas = 3, kOutvotedSigmas = 5;
+/// A visual motion is wild where the IMU or the wheels contradict it by this factor times the gate: 12 standard
+/// deviations.
+constexpr double kWildFactor = 4;
 /// Added to the variances of a motion (m², rad²), whose covariance may be singular.
 constexpr double kMinVariance = 1e-14;
 
@@ -31,6 +35,14 @@ Matrix6d usable_covariance(const Matrix6d& covariance, double factor) {
   Matrix6d r = 0.5 * factor * (covariance + covariance.transpose());
   r.diagonal().array() += kMinVariance;
   return r;
+}
+
+double translation_nis(const ErrorCovariance& covariance, const Innovation& innovation) {
+  Innovation shift(3);
+  shift.residual = innovation.residual.head<3>();
+  shift.jacobian = innovation.jacobian.topRows<3>();
+  shift.noise = innovation.noise.topLeftCorner<3, 3>();
+  return normalized_innovation_squared(covariance, shift);
 }
 
 /// Vision states the exact identity for it.
@@ -95,12 +107,14 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
   }
 
   const bool inertial = vision.constant_velocity_s == 0;
+  const ErrorCovariance predicted = p;
   p.topLeftCorner<9, 9>() += kPredictionNoiseFactor * vision.constant_velocity_noise;
 
   const Matrix6d covariance = usable_covariance(motion.own_covariance(), options_.vision.white_noise_factor);
   const Innovation innovation =
       relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, visual.errors,
                                  inertial ? LinearizedAt::estimate : LinearizedAt::measured_motion);
+  const double against_prediction = translation_nis(predicted, innovation);
   // The noise of the constant-velocity model grows with the speed: after a stop it is small, and the update would put
   // the residual of a true motion into the drift of vision.
   if (!inertial && prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
@@ -113,6 +127,17 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
   constexpr double kOutvoted = kOutvotedSigmas * kOutvotedSigmas;
   if (forward && forward->imu_and_wheels_agree && forward->vision_contradicts_imu && forward->vision_nis > kOutvoted)
     return accept_vision(forward->vision_nis, kOutvoted, HealthReason::outvoted);
+  // A single wild motion is a fault of vision; if the next one is contradicted, too, it is the other sensor's.
+  const bool is_wild = is_wild_motion(visual, nis, against_prediction);
+  const bool was_doubted = vision.doubted;
+  if (is_wild && !was_doubted && monitor.state != SensorState::excluded) {
+    vision.doubted = true;
+    vision.doubted_pose = memory_.estimate.state.world_from_vision_clone * measured;
+    memory_.estimate.covariance = predicted;
+    return accept_vision(std::max(nis, kWildFactor * vision_gate_), vision_gate_, HealthReason::wild);
+  }
+  vision.doubted = false;
+  if (was_doubted && (is_wild || nis > vision_gate_)) accept_doubted_motion();
   if (nis > vision_gate_) {
     // Vision that is excluded resets the prediction only where the wheels contradict the IMU, too.
     const bool wheels_contradict_imu = forward && !forward->imu_and_wheels_agree;
@@ -173,6 +198,48 @@ bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis
       .accept(0, vision_gate_, HealthReason::none, options_.health.excluded_after, options_.health.readmit_after);
   correct_motion(innovation, error_at::kVisionClone);
   return true;
+}
+
+/// Whether the IMU or the wheels contradict the motion by far. The wheels decide where they can: by their count since
+/// the last frame, or, if that is in the prediction already, by the distance predicted with constant velocity.
+bool ErrorStateFilter::is_wild_motion(const VisualMotion& visual, double inertial_nis,
+                                      double against_prediction) const {
+  const std::optional<double> against_wheels = compare_with_wheels(visual);
+  if (against_wheels && *against_wheels > kWildFactor * gates_[4]) return true;
+  if (memory_.vision.constant_velocity_s == 0)
+    return memory_.monitor(LocalizationSensor::imu).state == SensorState::ok &&
+           inertial_nis > kWildFactor * vision_gate_ && !(against_wheels && *against_wheels <= gates_[4]);
+  const bool wheels_in_prediction = !memory_.vision.has_wheels && wheels_at(visual.motion.to) &&
+                                    memory_.monitor(LocalizationSensor::wheels).state == SensorState::ok;
+  return wheels_in_prediction && against_prediction > kWildFactor * gates_[3];
+}
+
+/// NIS of the visual motion against the count of the wheels since the last frame, if they can tell.
+std::optional<double> ErrorStateFilter::compare_with_wheels(const VisualMotion& visual) const {
+  const VisionMemory& vision = memory_.vision;
+  const RelativeMotion& motion = visual.motion;
+  const std::optional<WheelSample> wheels = wheels_at(motion.to);
+  if (!wheels || !vision.has_wheels || memory_.monitor(LocalizationSensor::wheels).state != SensorState::ok)
+    return std::nullopt;
+  NavigationState seen;
+  seen.world_from_body = motion.previous_from_current;
+  seen.wheel_scale = memory_.estimate.state.wheel_scale;
+  ErrorCovariance p = ErrorCovariance::Zero();
+  p.topLeftCorner<6, 6>() = motion.covariance;
+  p(error_at::kWheelScale, error_at::kWheelScale) =
+      memory_.estimate.covariance(error_at::kWheelScale, error_at::kWheelScale);
+  return normalized_innovation_squared(p, wheel_innovation(seen, step_between(vision.wheels, *wheels), wheel_centre_));
+}
+
+/// Vision is contradicted a second time, so the motion before was right: what followed is moved to where it ended.
+/// odom_from_body is preserved.
+void ErrorStateFilter::accept_doubted_motion() {
+  NavigationState& s = memory_.estimate.state;
+  const Pose moved = memory_.vision.doubted_pose * s.world_from_vision_clone.inverse();
+  s.world_from_body = moved * s.world_from_body;
+  s.world_from_vision_clone = moved * s.world_from_vision_clone;
+  s.world_from_step_clone = moved * s.world_from_step_clone;
+  memory_.world_from_odom = moved * memory_.world_from_odom;
 }
 
 /// Distance along the body's x since the last frame, by the wheels, by the IMU and by vision. A repeating texture
