@@ -206,9 +206,10 @@ bool ErrorStateFilter::is_wild_motion(const VisualMotion& visual, double inertia
                                       double against_prediction) const {
   const std::optional<double> against_wheels = compare_with_wheels(visual);
   if (against_wheels && *against_wheels > kWildFactor * gates_[4]) return true;
-  if (memory_.vision.constant_velocity_s == 0)
+  if (memory_.vision.constant_velocity_s == 0) {
     return memory_.monitor(LocalizationSensor::imu).state == SensorState::ok &&
            inertial_nis > kWildFactor * vision_gate_ && !(against_wheels && *against_wheels <= gates_[4]);
+  }
   const bool wheels_in_prediction = !memory_.vision.has_wheels && wheels_at(visual.motion.to) &&
                                     memory_.monitor(LocalizationSensor::wheels).state == SensorState::ok;
   return wheels_in_prediction && against_prediction > kWildFactor * gates_[3];
