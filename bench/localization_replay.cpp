@@ -9,9 +9,7 @@
 #include <stdexcept>
 
 #include "localization_trial.h"
-#include "spartan/camera/frame_source.h"
-#include "spartan/core/trajectory.h"
-#include "spartan/system/run_store.h"
+#include "odometry_errors.h"
 #include "standard_recordings.h"
 
 namespace spartan {
@@ -26,10 +24,8 @@ struct RecordedDrive {
 std::optional<RecordedDrive> open_recorded(const std::string& recording, const std::string& run) {
   auto source = open_recording(recording);
   const auto poses = load_trajectory(recording + "/truth/poses.tum");
-  auto store = RunStore::open_read_only(run + "/run.sqlite");
-  if (!source || !poses || !store) return std::nullopt;
-  const auto frames = store->frames();
-  if (!frames) return std::nullopt;
+  const auto motions = motions_of_run(run);
+  if (!source || !poses || !motions || motions->empty()) return std::nullopt;
   RecordedDrive drive;
   const RecordingInfo& info = (*source)->info();
   drive.truth.scenario.gravity_m_s2 = info.gravity_m_s2.value_or(9.81);
@@ -46,18 +42,16 @@ std::optional<RecordedDrive> open_recorded(const std::string& recording, const s
     if (const auto* compass = std::get_if<CompassSample>(&s)) drive.drawn.compass.push_back(*compass);
     if (const auto* tilt = std::get_if<InclinometerSample>(&s)) drive.drawn.inclinometer.push_back(*tilt);
   }
-  for (const FrameRecord& frame : *frames) {
-    if (!frame.fault.empty()) continue;
-    const auto truth = std::min_element(poses->poses.begin(), poses->poses.end(), [&](const auto& a, const auto& b) {
-      return std::abs(a.stamp.ns - frame.stamp.ns) < std::abs(b.stamp.ns - frame.stamp.ns);
-    });
-    drive.truth.frames_s.push_back(seconds_between(sim::internal::stamp_at(0), frame.stamp));
-    drive.truth.poses.push_back(truth->pose);
-    if (frame.motion.first) continue;
-    const Matrix6d ad = adjoint(body_from_left);
-    drive.drawn.motions.push_back(
-        {frame.motion.from, frame.motion.to, body_from_left * frame.motion.previous_from_current * left_from_body,
-         ad * frame.motion.covariance * ad.transpose(), frame.status != name_of(TrackingStatus::lost)});
+  const auto add_frame = [&](Stamp stamp) {
+    drive.truth.frames_s.push_back(seconds_between(sim::internal::stamp_at(0), stamp));
+    drive.truth.poses.push_back(pose_near(poses->poses, stamp).pose);
+  };
+  const Matrix6d ad = adjoint(body_from_left);
+  add_frame(motions->front().from);
+  for (const MeasuredMotion& m : *motions) {
+    add_frame(m.to);
+    drive.drawn.motions.push_back({m.from, m.to, body_from_left * m.previous_from_current * left_from_body,
+                                   ad * m.covariance * ad.transpose(), m.measured});
   }
   for (std::size_t i = 1; i < drive.truth.poses.size(); ++i)
     drive.truth.length_m += (drive.truth.poses[i].translation() - drive.truth.poses[i - 1].translation()).norm();

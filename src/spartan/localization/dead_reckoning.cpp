@@ -49,19 +49,17 @@ void DeadReckoning::add(const RelativeMotion& motion) {
   reference_ = motion.from;
   covariance_ = at_reference_;
   const Pose& moved = motion.previous_from_current;
-  // The exact identity says that the rover is stationary: lasting errors have no part in it.
-  const bool stationary = moved.translation().isZero(1e-12) && moved.rotation().vec().isZero(1e-12);
-  const bool drifts = motion.measured && !stationary;
+  const bool drifts = motion.measured && !motion.is_stationary();
   if (drifts) {
     age(kDrift, drift_sigma_ratios_, drift_correlation_frames_);
     age(kConstant, constant_sigma_ratios_, kConstantSteps);
   }
-  const Matrix6d noise = motion.covariance - motion.by_calibration * motion.by_calibration.transpose();
+  const Matrix6d noise = motion.own_covariance();
   Covariance by = Covariance::Identity();
   by.topLeftCorner<6, 6>() = adjoint(moved.inverse());
   by.block<6, kSize - kCalibration>(0, kCalibration) = motion.by_calibration;
   if (drifts) {
-    const Matrix6d deviations = noise.diagonal().cwiseMax(0).cwiseSqrt().asDiagonal();
+    const Matrix6d deviations = motion.drift_scale().asDiagonal();
     by.block<6, 6>(0, kDrift) = deviations;
     by.block<6, 6>(0, kConstant) = deviations;
   }

@@ -96,6 +96,7 @@ LocalizationEstimate Localizer::estimate() const {
 }
 
 std::optional<LocalizationEstimate> Localizer::estimate_at(Stamp stamp) const {
+  if (started() && stamp == state_->filter.filter().memory().stamp) return estimate();
   const auto filter = state_->filter.at(stamp);
   if (!filter) return std::nullopt;
   return state_->estimate_of(*filter);

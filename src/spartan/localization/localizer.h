@@ -38,7 +38,9 @@ struct RelativeMotion {
 
   /// `covariance` without the part of the calibration.
   Matrix6d own_covariance() const;
+  /// D; zero for a stationary rover.
   Vector6d drift_scale() const;
+  bool is_stationary() const;
 };
 
 /// The sensors that are monitored: whether one is used, and why not.

@@ -26,6 +26,11 @@ double position_nees(const LocalizationEstimate& e, const Pose& first) {
   return error.dot(e.world_from_body.covariance.topLeftCorner<3, 3>().ldlt().solve(error));
 }
 
+/// After `from` and at most at `to`.
+bool within_s(Stamp stamp, double from, double to) {
+  return stamp > test_stamp(from) && stamp <= test_stamp(to);
+}
+
 /// The `count` motions from 30 s on are off by 0.5 m and 5° in a random direction.
 Trial with_wild_motions(const TestSensors& sensors, int count, std::uint64_t seed) {
   Trial trial{in_order(test_samples(TestDrive(), 62.5, sensors, seed), test_motions(TestDrive(), 62.5, 1, seed)), {}};
@@ -72,6 +77,22 @@ TEST(LocalizerWildMotion, IsSaidInTheHealth) {
   const SensorHealth vision = driven(test_options(), until).estimate().health_of(LocalizationSensor::vision);
   EXPECT_EQ(vision.state, SensorState::suspect);
   EXPECT_EQ(vision.reason, "its motion contradicts the IMU or the wheels by far");
+}
+
+// A motion that was rejected before a lost frame does not move the frames after it.
+TEST(LocalizerWildMotion, ALostFrameEndsTheDoubt) {
+  Trial trial = with_wild_motions({true, false, false, false}, 1, 6);
+  for (Measurement& m : trial.all) {
+    auto* motion = std::get_if<RelativeMotion>(&m);
+    if (motion == nullptr) continue;
+    if (within_s(motion->to, 32.5, 34)) motion->measured = false;
+    // Contradicted after the lost frame, too.
+    if (within_s(motion->to, 34, 35.5))
+      motion->previous_from_current = motion->previous_from_current * Pose::from_translation({0, 0.3, 0});
+  }
+  const LocalizationEstimate end = driven(test_options(), trial.all).estimate();
+  EXPECT_EQ(end.health_of(LocalizationSensor::vision).rejected, 3) << "wild, lost, wild";
+  EXPECT_LT(position_nees(end, trial.first), kThreeSigma);
 }
 
 // The second contradiction in a row is the IMU's: the motion that was rejected is accepted after all.

@@ -39,7 +39,12 @@ Matrix6d RelativeMotion::own_covariance() const {
 }
 
 Vector6d RelativeMotion::drift_scale() const {
-  return lasting_sigma.value_or(own_covariance().diagonal().cwiseSqrt());
+  if (is_stationary()) return Vector6d::Zero();
+  return lasting_sigma ? *lasting_sigma : own_covariance().diagonal().cwiseSqrt();
+}
+
+bool RelativeMotion::is_stationary() const {
+  return previous_from_current.translation().isZero(1e-12) && previous_from_current.rotation().vec().isZero(1e-12);
 }
 
 LocalizationSensor sensor_of(const Measurement& m) {

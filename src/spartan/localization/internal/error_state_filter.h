@@ -84,7 +84,11 @@ class ErrorStateFilter {
   bool prediction_contradicted(const Innovation& innovation) const;
   void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
   bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
-  bool is_wild_motion(const VisualMotion& visual, double inertial_nis, double against_prediction) const;
+  bool accept_vision(double nis, double gate, HealthReason why);
+  bool doubt_motion(const VisualMotion& visual, const Innovation& innovation, double nis);
+  void remove_weight_of_prediction(const Innovation& innovation, const RelativeMotion& motion);
+  bool is_wild_motion(const VisualMotion& visual, const Innovation& innovation, double inertial_nis) const;
+  std::optional<WheelStep> wheel_step_since_frame(Stamp stamp) const;
   std::optional<double> compare_with_wheels(const VisualMotion& visual) const;
   void accept_doubted_motion();
   std::optional<ForwardComparison> compare_forward(const VisualMotion& visual) const;

@@ -48,8 +48,9 @@ struct VisionMemory {
   /// Accumulated noise of the constant-velocity model (position, attitude, velocity), and for how long it was used.
   Matrix9d constant_velocity_noise = Matrix9d::Zero();
   double constant_velocity_s = 0;
-  /// The last motion was rejected as wild; by it, world_from_imu at clone_stamp would be `doubted_pose`.
+  /// The last motion was rejected as wild; by it, world_from_imu at `doubted_at` would be `doubted_pose`.
   bool doubted = false;
+  Stamp doubted_at;
   Pose doubted_pose;
   bool has_wheels = false;  ///< false also once a step of the wheels since clone_stamp has corrected the motion
   WheelSample wheels;       ///< at clone_stamp

@@ -45,12 +45,6 @@ double translation_nis(const ErrorCovariance& covariance, const Innovation& inno
   return normalized_innovation_squared(covariance, shift);
 }
 
-/// Vision states the exact identity for it.
-bool is_stationary(const RelativeMotion& motion) {
-  const Pose& m = motion.previous_from_current;
-  return m.translation().isZero(1e-12) && m.rotation().vec().isZero(1e-12);
-}
-
 // Position, attitude, velocity are the first errors.
 static_assert(error_at::kPosition == 0 && error_at::kAttitude == 3 && error_at::kVelocity == 6);
 
@@ -64,7 +58,8 @@ VisualMotion ErrorStateFilter::of_imu(const RelativeMotion& motion) const {
   m.motion.previous_from_current = arm_.imu_motion(motion.previous_from_current);
   m.motion.covariance = to_imu * motion.covariance * to_imu.transpose();
   m.motion.by_calibration = to_imu * motion.by_calibration;
-  if (!is_stationary(motion)) m.errors = {to_imu * motion.drift_scale().asDiagonal(), m.motion.by_calibration};
+  m.motion.lasting_sigma.reset();  // the body's; D of the IMU is not diagonal
+  if (!motion.is_stationary()) m.errors = {to_imu * motion.drift_scale().asDiagonal(), m.motion.by_calibration};
   return m;
 }
 
@@ -97,51 +92,28 @@ void ErrorStateFilter::update(const RelativeMotion& of_body) {
 bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
   const RelativeMotion& motion = visual.motion;
   VisionMemory& vision = memory_.vision;
-  ErrorCovariance& p = memory_.estimate.covariance;
-  const Pose& measured = motion.previous_from_current;
-  vision.stationary = is_stationary(motion);
-
+  vision.stationary = motion.is_stationary();
   if (!vision.stationary) {
     propagate_drift(error_at::kVisionDrift, drift_sigma_ratios_, options_.vision.drift_correlation_frames);
     propagate_drift(error_at::kVisionConstant, constant_sigma_ratios_, kConstantSteps);
   }
-
   const bool inertial = vision.constant_velocity_s == 0;
-  const ErrorCovariance predicted = p;
-  p.topLeftCorner<9, 9>() += kPredictionNoiseFactor * vision.constant_velocity_noise;
-
   const Matrix6d covariance = usable_covariance(motion.own_covariance(), options_.vision.white_noise_factor);
-  const Innovation innovation =
-      relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone, measured, covariance, visual.errors,
-                                 inertial ? LinearizedAt::estimate : LinearizedAt::measured_motion);
-  const double against_prediction = translation_nis(predicted, innovation);
-  // The noise of the constant-velocity model grows with the speed: after a stop it is small, and the update would put
-  // the residual of a true motion into the drift of vision.
-  if (!inertial && prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
-  const double nis = inertial ? normalized_innovation_squared(p, innovation) : 0;
-  SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
-  const auto accept_vision = [&](double value, double gate, HealthReason reason) {
-    return monitor.accept(value, gate, reason, options_.health.excluded_after, options_.health.readmit_after);
-  };
+  const Innovation innovation = relative_motion_innovation(
+      memory_.estimate.state, error_at::kVisionClone, motion.previous_from_current, covariance, visual.errors,
+      inertial ? LinearizedAt::estimate : LinearizedAt::measured_motion);
+  const double nis = inertial ? normalized_innovation_squared(memory_.estimate.covariance, innovation) : 0;
   const auto forward = inertial ? compare_forward(visual) : std::nullopt;
   constexpr double kOutvoted = kOutvotedSigmas * kOutvotedSigmas;
   if (forward && forward->imu_and_wheels_agree && forward->vision_contradicts_imu && forward->vision_nis > kOutvoted)
     return accept_vision(forward->vision_nis, kOutvoted, HealthReason::outvoted);
-  // A single wild motion is a fault of vision; if the next one is contradicted, too, it is the other sensor's.
-  const bool is_wild = is_wild_motion(visual, nis, against_prediction);
-  const bool was_doubted = vision.doubted;
-  if (is_wild && !was_doubted && monitor.state != SensorState::excluded) {
-    vision.doubted = true;
-    vision.doubted_pose = memory_.estimate.state.world_from_vision_clone * measured;
-    memory_.estimate.covariance = predicted;
-    return accept_vision(std::max(nis, kWildFactor * vision_gate_), vision_gate_, HealthReason::wild);
-  }
-  vision.doubted = false;
-  if (was_doubted && (is_wild || nis > vision_gate_)) accept_doubted_motion();
+  if (doubt_motion(visual, innovation, nis)) return false;
+
+  if (!inertial) remove_weight_of_prediction(innovation, motion);
   if (nis > vision_gate_) {
     // Vision that is excluded resets the prediction only where the wheels contradict the IMU, too.
     const bool wheels_contradict_imu = forward && !forward->imu_and_wheels_agree;
-    if (monitor.state == SensorState::excluded && !wheels_contradict_imu)
+    if (memory_.monitor(LocalizationSensor::vision).state == SensorState::excluded && !wheels_contradict_imu)
       return accept_vision(nis, vision_gate_, HealthReason::disagrees);
     return reset_prediction(innovation, nis, motion);
   }
@@ -150,6 +122,37 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
   if (inertial && imu.state == SensorState::suspect) imu.readmit();  // its prediction agrees with vision
   correct_motion(innovation, error_at::kVisionClone);
   return true;
+}
+
+bool ErrorStateFilter::accept_vision(double nis, double gate, HealthReason why) {
+  return memory_.monitor(LocalizationSensor::vision)
+      .accept(nis, gate, why, options_.health.excluded_after, options_.health.readmit_after);
+}
+
+/// Rejects a single wild motion, which is a fault of vision. If the next one is contradicted, too, the other sensor is
+/// wrong: then the motion before is accepted after all.
+bool ErrorStateFilter::doubt_motion(const VisualMotion& visual, const Innovation& innovation, double nis) {
+  VisionMemory& vision = memory_.vision;
+  const RelativeMotion& motion = visual.motion;
+  const bool is_wild = is_wild_motion(visual, innovation, nis);
+  const bool was_doubted = vision.doubted && vision.doubted_at == motion.from;
+  vision.doubted = is_wild && !was_doubted && !motion.keeps_reference &&
+                   memory_.monitor(LocalizationSensor::vision).state != SensorState::excluded;
+  if (vision.doubted) {
+    vision.doubted_at = motion.to;
+    vision.doubted_pose = memory_.estimate.state.world_from_vision_clone * motion.previous_from_current;
+    accept_vision(std::max(nis, kWildFactor * vision_gate_), vision_gate_, HealthReason::wild);
+  } else if (was_doubted && (is_wild || nis > vision_gate_)) {
+    accept_doubted_motion();
+  }
+  return vision.doubted;
+}
+
+/// A constant-velocity prediction gets no weight against vision. Its noise grows with the speed: after a stop it is
+/// small, and the update would put the residual of a true motion into the drift of vision.
+void ErrorStateFilter::remove_weight_of_prediction(const Innovation& innovation, const RelativeMotion& motion) {
+  memory_.estimate.covariance.topLeftCorner<9, 9>() += kPredictionNoiseFactor * memory_.vision.constant_velocity_noise;
+  if (prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
 }
 
 /// One step of a Gauss–Markov process.
@@ -194,16 +197,15 @@ bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis
   memory_.monitor(LocalizationSensor::imu)
       .accept(nis, vision_gate_, HealthReason::contradicted, options_.health.excluded_after,
               options_.health.readmit_after);
-  memory_.monitor(LocalizationSensor::vision)
-      .accept(0, vision_gate_, HealthReason::none, options_.health.excluded_after, options_.health.readmit_after);
+  accept_vision(0, vision_gate_, HealthReason::none);
   correct_motion(innovation, error_at::kVisionClone);
   return true;
 }
 
 /// Whether the IMU or the wheels contradict the motion by far. The wheels decide where they can: by their count since
 /// the last frame, or, if that is in the prediction already, by the distance predicted with constant velocity.
-bool ErrorStateFilter::is_wild_motion(const VisualMotion& visual, double inertial_nis,
-                                      double against_prediction) const {
+bool ErrorStateFilter::is_wild_motion(const VisualMotion& visual, const Innovation& innovation,
+                                      double inertial_nis) const {
   const std::optional<double> against_wheels = compare_with_wheels(visual);
   if (against_wheels && *against_wheels > kWildFactor * gates_[4]) return true;
   if (memory_.vision.constant_velocity_s == 0) {
@@ -212,16 +214,22 @@ bool ErrorStateFilter::is_wild_motion(const VisualMotion& visual, double inertia
   }
   const bool wheels_in_prediction = !memory_.vision.has_wheels && wheels_at(visual.motion.to) &&
                                     memory_.monitor(LocalizationSensor::wheels).state == SensorState::ok;
-  return wheels_in_prediction && against_prediction > kWildFactor * gates_[3];
+  return wheels_in_prediction && translation_nis(memory_.estimate.covariance, innovation) > kWildFactor * gates_[3];
+}
+
+/// The step of the wheels since the last frame. None if they cannot tell, or if their counts are in the prediction
+/// already.
+std::optional<WheelStep> ErrorStateFilter::wheel_step_since_frame(Stamp stamp) const {
+  const std::optional<WheelSample> wheels = wheels_at(stamp);
+  if (!wheels || !memory_.vision.has_wheels) return std::nullopt;
+  return step_between(memory_.vision.wheels, *wheels);
 }
 
 /// NIS of the visual motion against the count of the wheels since the last frame, if they can tell.
 std::optional<double> ErrorStateFilter::compare_with_wheels(const VisualMotion& visual) const {
-  const VisionMemory& vision = memory_.vision;
   const RelativeMotion& motion = visual.motion;
-  const std::optional<WheelSample> wheels = wheels_at(motion.to);
-  if (!wheels || !vision.has_wheels || memory_.monitor(LocalizationSensor::wheels).state != SensorState::ok)
-    return std::nullopt;
+  const std::optional<WheelStep> step = wheel_step_since_frame(motion.to);
+  if (!step || memory_.monitor(LocalizationSensor::wheels).state != SensorState::ok) return std::nullopt;
   NavigationState seen;
   seen.world_from_body = motion.previous_from_current;
   seen.wheel_scale = memory_.estimate.state.wheel_scale;
@@ -229,7 +237,7 @@ std::optional<double> ErrorStateFilter::compare_with_wheels(const VisualMotion& 
   p.topLeftCorner<6, 6>() = motion.covariance;
   p(error_at::kWheelScale, error_at::kWheelScale) =
       memory_.estimate.covariance(error_at::kWheelScale, error_at::kWheelScale);
-  return normalized_innovation_squared(p, wheel_innovation(seen, step_between(vision.wheels, *wheels), wheel_centre_));
+  return normalized_innovation_squared(p, wheel_innovation(seen, *step, wheel_centre_));
 }
 
 /// Vision is contradicted a second time, so the motion before was right: what followed is moved to where it ended.
@@ -244,20 +252,16 @@ void ErrorStateFilter::accept_doubted_motion() {
 }
 
 /// Distance along the body's x since the last frame, by the wheels, by the IMU and by vision. A repeating texture
-/// shifts a visual motion by its period, with a small covariance. None if the wheels cannot tell, or if their counts
-/// since the last frame are in the prediction already.
+/// shifts a visual motion by its period, with a small covariance. None if the wheels cannot tell.
 std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const VisualMotion& visual) const {
   const RelativeMotion& motion = visual.motion;
-  const VisionMemory& vision = memory_.vision;
-  const std::optional<WheelSample> wheels = wheels_at(motion.to);
-  if (!wheels || !vision.has_wheels || memory_.monitor(LocalizationSensor::wheels).state == SensorState::excluded)
-    return std::nullopt;
+  const std::optional<WheelStep> step = wheel_step_since_frame(motion.to);
+  if (!step || memory_.monitor(LocalizationSensor::wheels).state == SensorState::excluded) return std::nullopt;
   const NavigationState& s = memory_.estimate.state;
   const ErrorCovariance& p = memory_.estimate.covariance;
-  const WheelStep step = step_between(vision.wheels, *wheels);
-  const double counted_m = s.wheel_scale * step.counted_m;
-  const double counted_variance = std::pow(step.forward_sigma_m, 2) +
-                                  p(error_at::kWheelScale, error_at::kWheelScale) * step.counted_m * step.counted_m;
+  const double counted_m = s.wheel_scale * step->counted_m;
+  const double counted_variance = std::pow(step->forward_sigma_m, 2) +
+                                  p(error_at::kWheelScale, error_at::kWheelScale) * step->counted_m * step->counted_m;
   const StepForward predicted = forward_since(s, error_at::kVisionClone, wheel_centre_);
   const double predicted_variance = predicted.jacobian * p * predicted.jacobian.transpose();
   // As in relative_motion_innovation(): white noise, and the errors that last.
