@@ -35,6 +35,7 @@ std::vector<RelativeMotion> vision(const RealDrive& d, const OdometryErrors& err
   Matrix6d of_truth = Matrix6d::Zero();
   of_truth.diagonal().head<3>().setConstant(d.truth_sigma_m * d.truth_sigma_m);
   of_truth.diagonal().tail<3>().setConstant(d.truth_sigma_rad * d.truth_sigma_rad);
+  of_truth /= VisionOptions().white_noise_factor;  // by which the filter multiplies the covariance
   std::vector<RelativeMotion> motions;
   for (std::size_t i = 1; i < d.frames.size(); ++i) {
     RelativeMotion m;
@@ -177,12 +178,15 @@ void print_result(const RealDrive& d, int seed, const Sensors& sensors, const Dr
   if (up.empty()) up = {0};
   std::sort(up.begin(), up.end());
   fmt::print(
-      "| {} | vision{}{} | {:.1f}, {:.1f} | {:.1f} | {:.3f}, {:.3f} | {:.3f}, {:.3f}, {:.3f} | {} | {} | {:.2f}, "
+      "| {} | vision{}{} | {:.1f}, {:.1f} | {:.1f} | {:.3f}, {:.3f} | {:.3f}, {:.3f}, {:.3f} | {} | {} | {} | {:.2f}, "
       "{:.2f} |\n",
       seed, sensors.imu ? "+imu" : "", sensors.wheels ? "+wheels" : "",
       1e3 * std::sqrt(squares / static_cast<double>(r.frames.size())), 1e3 * end->position_m, 1e3 * end->sigma_m,
       end->attitude_deg, end->heading_deg, std::sqrt(up_squares / static_cast<double>(up.size())),
       up[up.size() * 95 / 100], up.back(), sensors.imu ? gyro_bias_text(d, *after) : "",
+      sensors.imu ? fmt::format("{:.2f}, {:.2f}", 1e3 * end->estimate.imu_time_offset_s,
+                                1e3 * end->estimate.imu_time_offset_sigma_s)
+                  : "",
       sensors.imu ? r.imu_not_ok() : 0, r.mean(&FrameResult::nees_position), r.mean(&FrameResult::nees_pose));
 }
 
@@ -198,8 +202,8 @@ void print_drive(const RealDrive& d, const OdometryErrors& errors, int seeds, co
   fmt::print(
       "Roll and pitch, gyro bias: after 5 s. Gyro bias: difference to the reference, or the estimate in brackets.\n\n"
       "| seed | sensors | ATE, end, mm | 1 sigma | attitude, heading at the end, deg | roll and pitch, RMS, 95 %, "
-      "largest, deg | gyro bias, 1 sigma, mrad/s | IMU not ok, frames | mean NEES position, pose |\n"
-      "|---|---|---|---|---|---|---|---|---|\n");
+      "largest, deg | gyro bias, 1 sigma, mrad/s | clock of the IMU, 1 sigma, ms | IMU not ok, frames | mean NEES "
+      "position, pose |\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (int seed = 1; seed <= seeds; ++seed) {
     const auto motions = vision(d, errors, static_cast<std::uint64_t>(seed));
     for (const Sensors& sensors : {Sensors{false, false}, with})

@@ -167,6 +167,7 @@ struct TrialResult {
   std::vector<FrameError> frames;
   double ate_m = 0, final_percent = 0;
   LocalizationEstimate last;
+  std::optional<std::size_t> imu_aligned_at;  ///< first frame at which the readings of the IMU were used
   std::array<std::array<double, 4>, kLocalizationSensors> states_s{};  ///< frames in each state, by sensor
 };
 
@@ -178,8 +179,9 @@ inline LocalizationOptions options_for(const TrueDrive& drive) {
   return with_specified_noise(options, sim::internal::specified_noise(s.imu, s.compass, s.inclinometer));
 }
 
-inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all) {
-  Localizer localizer = Localizer::create(options_for(drive)).value();
+inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all,
+                             const LocalizationOptions& options) {
+  Localizer localizer = Localizer::create(options).value();
   TrialResult result;
   Pose first;  // of the localization, relative to which errors are measured
   const std::int64_t start_ns = sim::internal::stamp_at(drive.frames_s.front()).ns;
@@ -197,6 +199,7 @@ inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>&
     const LocalizationEstimate& e = result.last;
     for (std::size_t i = 0; i < result.states_s.size(); ++i)
       result.states_s[i][static_cast<std::size_t>(e.health[i].state)] += 1;
+    if (e.imu_aligned && !result.imu_aligned_at) result.imu_aligned_at = frame;
     const Pose estimate = first.inverse() * e.world_from_body.pose,
                truth = drive.poses[0].inverse() * drive.poses[frame];
     const Vector6d error = log_se3(estimate.inverse() * truth);

@@ -46,6 +46,27 @@ inline std::optional<std::vector<MeasuredMotion>> motions_of_run(const std::stri
   return motions;
 }
 
+/// Covariance of a typical motion: medians of the standard deviations, means of the correlations.
+inline Matrix6d typical_covariance(const std::vector<MeasuredMotion>& motions) {
+  Matrix6d correlation = Matrix6d::Zero();
+  Vector6d sigmas;
+  for (int i = 0; i < 6; ++i) {
+    std::vector<double> values;
+    values.reserve(motions.size());
+    for (const MeasuredMotion& m : motions) values.push_back(std::sqrt(m.covariance(i, i)));
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+    sigmas[i] = values[values.size() / 2];
+  }
+  int count = 0;
+  for (const MeasuredMotion& m : motions) {
+    const Vector6d inverse = m.covariance.diagonal().cwiseSqrt().cwiseInverse();
+    if (!inverse.allFinite()) continue;
+    correlation += inverse.asDiagonal() * m.covariance * inverse.asDiagonal();
+    ++count;
+  }
+  return sigmas.asDiagonal() * (correlation / count) * sigmas.asDiagonal();
+}
+
 /// Errors of consecutive motions of one drive, whitened: L⁻¹ e with the Cholesky factor L of the reported covariance.
 using WhitenedErrors = std::vector<Vector6d>;
 

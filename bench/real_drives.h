@@ -34,18 +34,6 @@ struct RealDrive {
   double length_m = 0;
 };
 
-inline Matrix6d median_covariance(const std::vector<MeasuredMotion>& motions) {
-  Matrix6d median = Matrix6d::Zero();
-  for (int i = 0; i < 6; ++i) {
-    std::vector<double> values;
-    values.reserve(motions.size());
-    for (const MeasuredMotion& m : motions) values.push_back(m.covariance(i, i));
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    median(i, i) = values[values.size() / 2];
-  }
-  return median;
-}
-
 // Local quadratic fit of position and rotation over ± half_s: the ground truth of TUM-VI is a motion capture system of
 // 120 Hz without any smoothing, whose rotations scatter by 1 mrad.
 inline std::optional<Pose> smoothed(const Trajectory& truth, Stamp at, double half_s) {
@@ -91,7 +79,7 @@ inline RealDrive open_drive(const std::string& name, const std::string& folder, 
   d.noise = (*source)->info().noise;
   d.imu = all_imu(**source);
   d.measured = *motions;
-  d.covariance = median_covariance(*motions);
+  d.covariance = typical_covariance(*motions);
   d.body_from_left = d.rig.body_from_camera(d.pair.left);
   return d;
 }
@@ -187,7 +175,7 @@ inline RealDrive open_kitti(const std::string& folder, const std::string& run) {
   d.pair = d.rig.pairs.front();
   d.body_from_left = d.rig.body_from_camera(d.pair.left);
   d.measured = *motions;
-  d.covariance = median_covariance(*motions);
+  d.covariance = typical_covariance(*motions);
   const std::string poses_file = folder + "/poses_imu_all144.txt";
   const auto truth = parse_kitti(read_file(poses_file).value_or(""), poses_file, {});
   if (!truth) throw std::runtime_error(truth.error().message());

@@ -17,6 +17,7 @@ struct InertialOptions {
   /// Position of the IMU on the body, and stamp of the IMU minus stamp of the cameras: of the rig file (Rig::imu).
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   double time_offset_s = 0;
+  double time_offset_sigma_s = 0.01;         ///< s, standard deviation of the clock of the IMU around that; 0: exact
   double gyro_noise_rad_s_sqrt_hz = 1.2e-4;  ///< rad/s/√Hz, white noise of the gyro
   double gyro_bias_sigma_rad_s = 0.05;       ///< rad/s, initial standard deviation of the gyro bias
   double gyro_walk_rad_s2_sqrt_hz = 2e-5;    ///< rad/s²/√Hz, random walk of the gyro bias
@@ -29,6 +30,9 @@ struct InertialOptions {
   double alignment_s = 1.0;                  ///< s, least length of the motions that align an IMU
   double stationary_gyro_rad_s = 0.004;      ///< rad/s, threshold on standard deviation and mean of a stationary gyro
   double stationary_accel_m_s2 = 0.03;  ///< m/s², threshold on the standard deviation of a stationary accelerometer
+
+  /// Largest error of the clock that can be estimated: readings with stamps up to this far ahead are waited for.
+  double max_time_error_s() const { return std::min(3 * time_offset_sigma_s, 0.1); }
 
   /// Largest standard deviations of the readings of a stationary rover, `interval_s` apart.
   double stationary_gyro(double interval_s) const {
@@ -72,6 +76,10 @@ struct InertialOptions {
         "Standard deviation of the accelerometer's scale (and of the stated gravity), as a fraction; raising it lets "
         "the measured size of gravity be estimated farther from the stated one.",
         between(0, 0.2));
+    v.field("time_offset_sigma_s", time_offset_sigma_s,
+            "Standard deviation in seconds of the difference between the clocks of IMU and cameras, around "
+            "imu.time_offset_s of the rig file; errors up to three times this are estimated. 0: the clocks agree.",
+            between(0, 1));
     v.field("timeout_s", timeout_s,
             "Longest gap between two IMU samples that is integrated over, in seconds; beyond it the constant-velocity "
             "model takes over.",
@@ -103,13 +111,13 @@ struct InertialOptions {
 /// a lasting error z in units of the measured standard deviations D, with a slowly changing and a constant part
 /// (docs/math/localization.md, "Vision").
 struct VisionOptions {
-  double white_noise_factor = 0.83;  ///< factor on the covariance of visual motions
+  double white_noise_factor = 0.57;  ///< factor on the covariance of visual motions
   /// Standard deviations of the slowly changing error (Gauss–Markov), in measured standard deviations: x, y, z, about
   /// x, y, z.
-  std::vector<double> drift_sigma_ratios{0.74, 0.53, 0.29, 0.49, 0.4, 0.3};
-  double drift_correlation_frames = 57;  ///< frames, correlation length of that error
+  std::vector<double> drift_sigma_ratios{0.47, 0.25, 0.47, 0.37, 0.6, 0.6};
+  double drift_correlation_frames = 7;  ///< frames, correlation length of that error
   /// The same of the error that is constant over a drive.
-  std::vector<double> constant_sigma_ratios{0.91, 0.66, 0.35, 0.61, 0.49, 0.36};
+  std::vector<double> constant_sigma_ratios{0.52, 0.55, 0.55, 0.37, 0.32, 0.4};
   double gate_probability = 0.999999;  ///< fraction of correct motions that pass the chi-square test
 
   template <class Visitor>

@@ -13,7 +13,7 @@ using namespace internal;
 
 namespace {
 
-constexpr std::uint32_t kStateVersion = 6;
+constexpr std::uint32_t kStateVersion = 7;
 
 }  // namespace
 
@@ -92,11 +92,10 @@ bool Localizer::reaches(Stamp stamp) const {
 }
 
 LocalizationEstimate Localizer::estimate() const {
-  return state_->estimate_of(state_->filter.filter());
+  return state_->estimate_of(state_->filter.newest());
 }
 
 std::optional<LocalizationEstimate> Localizer::estimate_at(Stamp stamp) const {
-  if (started() && stamp == state_->filter.filter().memory().stamp) return estimate();
   const auto filter = state_->filter.at(stamp);
   if (!filter) return std::nullopt;
   return state_->estimate_of(*filter);
@@ -121,6 +120,9 @@ LocalizationEstimate Localizer::State::estimate_of(const ErrorStateFilter& state
                           by_attitude_and_velocity.transpose();
   e.biases = {s.gyro_bias_rad_s, p.diagonal().segment<3>(error_at::kGyroBias).cwiseSqrt(), s.accel_bias_m_s2,
               p.diagonal().segment<3>(error_at::kAccelBias).cwiseSqrt()};
+  e.imu_aligned = m.imu.aligned;
+  e.imu_time_offset_s = options.imu.time_offset_s + s.imu_time_offset_s;
+  e.imu_time_offset_sigma_s = std::sqrt(p(error_at::kImuTime, error_at::kImuTime));
   if (m.wheels.slip_known) e.slip = WheelSlip{m.wheels.slip_stamp, m.wheels.slip, m.wheels.slip_sigma};
   e.heading.east = m.compass.heading_east;
   if (m.compass.offset_known) {

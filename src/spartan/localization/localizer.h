@@ -202,7 +202,10 @@ struct LocalizationEstimate {
   Pose world_from_odom;
   Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();  ///< world
   Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();
+  bool imu_aligned = false;  ///< biases and velocity are known well enough to use the readings of the IMU
   InertialBiases biases;
+  /// Stamp of the IMU minus stamp of the cameras at the same moment, with its standard deviation.
+  double imu_time_offset_s = 0, imu_time_offset_sigma_s = 0;
   std::optional<WheelSlip> slip;
   WorldHeading heading;
   bool gravity_measured = false;  ///< z was aligned to measured gravity at the start; else to the start attitude

@@ -112,6 +112,11 @@ TEST(LocalizerSensorMounts, AnImuOfAnotherClock) {
   EXPECT_EQ(right.health_of(LocalizationSensor::imu).rejected, 0);
   EXPECT_LT(position_error(right, drive), 0.01);
   options.imu.time_offset_s = 0;
+  const LocalizationEstimate found = driven(options, all).estimate();
+  EXPECT_NEAR(found.imu_time_offset_s, 0.03, 0.002);
+  EXPECT_NEAR(found.imu_time_offset_s, 0.03, 3 * found.imu_time_offset_sigma_s);
+  EXPECT_LT(position_error(found, drive), 0.01);
+  options.imu.time_offset_sigma_s = 0;
   EXPECT_GT(position_error(driven(options, all).estimate(), drive), 0.03) << "without the offset";
 }
 

@@ -23,7 +23,7 @@ constexpr double kRockingThreshold = 3, kMaxRockingFactor = 15;
 }  // namespace
 
 void ErrorStateFilter::update(const CompassSample& sample) {
-  propagate_to(sample.stamp, nullptr);
+  advance_to(sample.stamp);
   // A vertical of variance σ² biases headings by up to ½ σ², always in the same direction.
   const double tilt_bias = 0.5 * memory_.estimate.covariance.diagonal().segment<2>(error_at::kGravityTilt).sum();
   const double sigma = std::hypot(std::max(sample.sigma_rad, options_.compass.min_sigma_rad),
@@ -68,7 +68,7 @@ void ErrorStateFilter::initialize_compass_offset(const CompassSample& sample, do
 }
 
 void ErrorStateFilter::update(const InclinometerSample& sample) {
-  propagate_to(sample.stamp, nullptr);
+  advance_to(sample.stamp);
   const double sigma =
       options_.inclinometer.noise_factor * std::max(sample.sigma_rad, options_.inclinometer.min_sigma_rad);
   NavigationState& s = memory_.estimate.state;
@@ -103,12 +103,12 @@ void ErrorStateFilter::inflate_attitude(const Innovation& innovation) {
 }
 
 void ErrorStateFilter::update(const PoseConstraint& constraint) {
-  propagate_to(constraint.stamp, nullptr);
+  advance_to(constraint.stamp);
   apply_constraint(constraint, error_at::kPose);
 }
 
 void ErrorStateFilter::update(const LateConstraint& constraint) {
-  propagate_to(constraint.stamp, nullptr);
+  advance_to(constraint.stamp);
   if (constraint.at_frame.stamp == memory_.vision.clone_stamp)
     apply_constraint(constraint.at_frame, error_at::kVisionClone);
 }

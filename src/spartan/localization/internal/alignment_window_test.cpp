@@ -11,16 +11,18 @@ namespace {
 struct Flight {
   double gravity_m_s2 = 9.81;
   Eigen::Vector3d gyro_bias{-0.02, 0.03, 0.08}, accel_bias{0.15, -0.1, 0.2};
+  double imu_late_s = 0;  ///< stamps of the IMU
 
   Pose at(double t) const {
     const Eigen::Vector3d turn(0.9 + 0.3 * std::sin(1.3 * t), 0.25 * std::sin(1.9 * t + 1), 0.5 * t);
     return {exp_so3(turn), {std::sin(1.1 * t), std::cos(0.9 * t), 0.3 * std::sin(1.7 * t)}};
   }
-  ImuSample imu(double t) const {
+  ImuSample imu(double stamp) const {
+    const double t = stamp - imu_late_s;
     constexpr double h = 1e-3;
     const Pose now = at(t), before = at(t - h), after = at(t + h);
     const Eigen::Vector3d acceleration = (after.translation() - 2 * now.translation() + before.translation()) / (h * h);
-    return {test_stamp(t), log_so3(before.rotation().conjugate() * after.rotation()) / (2 * h) + gyro_bias,
+    return {test_stamp(stamp), log_so3(before.rotation().conjugate() * after.rotation()) / (2 * h) + gyro_bias,
             now.rotation().conjugate() * (acceleration + Eigen::Vector3d(0, 0, gravity_m_s2)) + accel_bias};
   }
   Eigen::Vector3d velocity(double t) const {
@@ -66,7 +68,7 @@ AlignmentWindow filled(const Flight& flight, int frames, double sigma, std::uint
   return window;
 }
 
-const AlignmentPrior kPrior{0.05, 0.3, 9.81, std::nullopt, 0};
+const AlignmentPrior kPrior{0.05, 0.3, 9.81, 0, std::nullopt, 0};
 
 TEST(AlignmentWindow, FindsBiasesVelocityAndGravityInMotion) {
   const Flight flight;
@@ -80,6 +82,21 @@ TEST(AlignmentWindow, FindsBiasesVelocityAndGravityInMotion) {
   const Eigen::Vector3d up = flight.at(t).rotation().conjugate() * Eigen::Vector3d::UnitZ();
   EXPECT_LE((a->up - up).norm(), 0.01);
   EXPECT_LE((a->accel_bias_m_s2 - flight.accel_bias).norm(), 0.1);
+}
+
+TEST(AlignmentWindow, FindsTheOffsetOfTheClock) {
+  Flight flight;
+  flight.imu_late_s = 0.02;
+  const AlignmentWindow window = filled(flight, 30, 5e-5, 3);
+  EXPECT_FALSE(window.align(kPrior)) << "the clocks are said to agree";
+  AlignmentPrior prior = kPrior;
+  prior.time_s = 0.01;
+  const auto a = window.align(prior);
+  ASSERT_TRUE(a);
+  EXPECT_NEAR(a->time_offset_s, 0.02, 1e-3);
+  EXPECT_LE((a->gyro_bias_rad_s - flight.gyro_bias).norm(), 2e-3);
+  EXPECT_GT(std::sqrt(a->covariance(12, 12)), 1e-5);
+  EXPECT_LT(std::sqrt(a->covariance(12, 12)), 1e-3);
 }
 
 TEST(AlignmentWindow, TheFirstMotionGivesTheNominalBiasOfTheGyro) {

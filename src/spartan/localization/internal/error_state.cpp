@@ -12,6 +12,7 @@ NavigationState add_error(const NavigationState& s, const ErrorVector& e) {
   r.accel_bias_m_s2 += e.segment<3>(error_at::kAccelBias);
   r.gravity_tilt_rad += e.segment<2>(error_at::kGravityTilt);
   r.gravity_scale += e[error_at::kGravityScale];
+  r.imu_time_offset_s += e[error_at::kImuTime];
   r.wheel_scale += e[error_at::kWheelScale];
   r.compass_offset_rad += e[error_at::kCompassOffset];
   r.inclinometer_bias_rad += e.segment<2>(error_at::kInclinometerBias);
@@ -31,6 +32,7 @@ ErrorVector error_between(const NavigationState& a, const NavigationState& b) {
   e.segment<3>(error_at::kAccelBias) = b.accel_bias_m_s2 - a.accel_bias_m_s2;
   e.segment<2>(error_at::kGravityTilt) = b.gravity_tilt_rad - a.gravity_tilt_rad;
   e[error_at::kGravityScale] = b.gravity_scale - a.gravity_scale;
+  e[error_at::kImuTime] = b.imu_time_offset_s - a.imu_time_offset_s;
   e[error_at::kWheelScale] = b.wheel_scale - a.wheel_scale;
   e[error_at::kCompassOffset] = b.compass_offset_rad - a.compass_offset_rad;
   e.segment<2>(error_at::kInclinometerBias) = b.inclinometer_bias_rad - a.inclinometer_bias_rad;

@@ -20,7 +20,8 @@ inline constexpr int kAccelBias = 12;  ///< m/s², body
 inline constexpr int kMoving = 15;     ///< errors before this index are propagated
 inline constexpr int kGravityTilt = kMoving;
 inline constexpr int kGravityScale = kGravityTilt + 2;
-inline constexpr int kWheelScale = kGravityScale + 1;
+inline constexpr int kImuTime = kGravityScale + 1;
+inline constexpr int kWheelScale = kImuTime + 1;
 inline constexpr int kCompassOffset = kWheelScale + 1;
 inline constexpr int kInclinometerBias = kCompassOffset + 1;
 inline constexpr int kVisionDrift = kInclinometerBias + 2;
@@ -47,6 +48,7 @@ struct NavigationState {
   Eigen::Vector2d gravity_tilt_rad = Eigen::Vector2d::Zero();
   /// Measured over true gravity: the scale error of the accelerometer where it matters.
   double gravity_scale = 1;
+  double imu_time_offset_s = 0;                                     ///< stamp of the IMU minus stamp of the cameras
   double wheel_scale = 1;                                           ///< travelled over counted distance
   double compass_offset_rad = 0;                                    ///< reading − heading in the world
   Eigen::Vector2d inclinometer_bias_rad = Eigen::Vector2d::Zero();  ///< roll, pitch

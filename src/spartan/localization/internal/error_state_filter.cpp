@@ -18,6 +18,8 @@ constexpr double kExact = 1e-6;
 /// vertical before the static alignment corrects it.
 constexpr double kUnknownSpeed_m_s = 20, kRestingSpeed_m_s = 0.01;
 constexpr double kAlignedTilt_rad = 0.5, kUnknownTilt_rad = 0.35, kUnknownHeading_rad = 10;
+/// Random walk of the clock of the IMU: 20 ppm are 2 ms in 100 s.
+constexpr double kClockWalk_s_sqrt_s = 2e-4;
 /// Longest step of the constant-velocity model: beyond it the covariance stops growing.
 constexpr double kMaxStep_s = 60;
 
@@ -81,6 +83,7 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
   set_variance(p, error_at::kAccelBias, 3, std::max(options_.imu.accel_bias_sigma_m_s2, 1e-9));
   set_variance(p, error_at::kGravityTilt, 2, m.gravity_known ? kAlignedTilt_rad : kUnknownTilt_rad);
   set_variance(p, error_at::kGravityScale, 1, std::max(options_.imu.accel_scale_sigma, 1e-9));
+  set_variance(p, error_at::kImuTime, 1, std::max(options_.imu.time_offset_sigma_s, 1e-9));
   set_variance(p, error_at::kCalibration, 8, 1);
   set_variance(p, error_at::kWheelScale, 1, std::max(options_.wheels.scale_sigma, 1e-6));
   set_variance(p, error_at::kCompassOffset, 1,
@@ -116,6 +119,7 @@ void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, 
     for (std::size_t i = 1; i < imu.size(); ++i) m.imu.noise.add(imu[i - 1], imu[i]);
     if (!m.imu.aligned) m.imu.window.begin(stamp);
     m.imu.waiting_since = stamp;
+    m.step.stationary = m.imu.aligned;
   }
   if (!wheels.empty()) {
     m.wheels.known = true;
@@ -142,15 +146,27 @@ bool ErrorStateFilter::inertial_usable() const {
          memory_.monitor(LocalizationSensor::imu).state != SensorState::excluded;
 }
 
-// With an IMU sample at the end of the step both ends are measured; otherwise the last reading is held up to the
-// timeout.
-void ErrorStateFilter::propagate_to(Stamp stamp, const ImuSample* reached) {
+// Uses the readings up to that time. If the next one is known already, the last step is interpolated.
+void ErrorStateFilter::advance_to(Stamp stamp) {
+  use_waiting_until(stamp);
+  const ImuQueue& waiting = memory_.imu.waiting;
+  if (waiting.empty() || !is_possible(waiting.front())) {
+    propagate_to(stamp, nullptr);
+  } else {
+    const ImuSample next = at_frame_time(waiting.front());
+    propagate_to(stamp, &next);
+  }
+}
+
+// With an IMU sample at or after the end of the step both ends are measured; otherwise the last reading is held up to
+// the timeout.
+void ErrorStateFilter::propagate_to(Stamp stamp, const ImuSample* next) {
   const double seconds = seconds_between(memory_.stamp, stamp);
   if (!(seconds > 0)) return;
   const ImuSample& last = memory_.imu.last;
   if (inertial_usable() && seconds_between(last.stamp, stamp) <= options_.imu.timeout_s) {
-    if (reached != nullptr) {
-      propagate_inertially(seconds, interpolate(last, *reached, memory_.stamp), *reached);
+    if (next != nullptr) {
+      propagate_inertially(seconds, interpolate(last, *next, memory_.stamp), interpolate(last, *next, stamp));
     } else {
       propagate_inertially(seconds, last, last);
     }
@@ -191,6 +207,8 @@ void ErrorStateFilter::propagate_at_constant_velocity(double seconds) {
 void ErrorStateFilter::propagate_biases(double seconds) {
   ErrorCovariance& p = memory_.estimate.covariance;
   const auto square = [](double x) { return x * x; };
+  if (p(error_at::kImuTime, error_at::kImuTime) < square(options_.imu.time_offset_sigma_s))
+    p(error_at::kImuTime, error_at::kImuTime) += square(kClockWalk_s_sqrt_s) * seconds;
   if (p(error_at::kWheelScale, error_at::kWheelScale) < square(options_.wheels.scale_sigma))
     p(error_at::kWheelScale, error_at::kWheelScale) += square(options_.wheels.scale_walk_per_sqrt_s) * seconds;
   p(error_at::kCompassOffset, error_at::kCompassOffset) +=

@@ -32,6 +32,9 @@ struct VisualMotion {
   MotionErrors errors;
 };
 
+/// Whether a reading is in the physical range of a rover.
+bool is_possible(const ImuSample& sample);
+
 class ErrorStateFilter {
  public:
   explicit ErrorStateFilter(const LocalizationOptions& options);
@@ -42,11 +45,12 @@ class ErrorStateFilter {
              const std::optional<Eigen::Vector3d>& up_in_body = {},
              const Eigen::Vector3d& assumed_up_in_body = Eigen::Vector3d::UnitZ());
 
-  /// Measurements must be processed in the order of comes_before().
+  /// Measurements must be processed in the order of comes_before(), but those of the IMU by
+  /// InertialOptions::max_time_error_s before their stamps.
   void process(const Measurement& measurement);
 
   /// Propagates to a time that is not earlier than that of the memory.
-  void predict_to(Stamp stamp) { propagate_to(stamp, nullptr); }
+  void predict_to(Stamp stamp) { advance_to(stamp); }
 
   const FilterMemory& memory() const { return memory_; }
   void set_memory(const FilterMemory& memory) { memory_ = memory; }
@@ -61,14 +65,18 @@ class ErrorStateFilter {
   UncertainPose odom_from_imu() const;
 
   // Propagation: error_state_filter.cpp.
-  void propagate_to(Stamp stamp, const ImuSample* reached);
+  void advance_to(Stamp stamp);
+  void propagate_to(Stamp stamp, const ImuSample* next);
   void propagate_inertially(double seconds, const ImuSample& from, const ImuSample& to);
   void propagate_at_constant_velocity(double seconds);
   void propagate_biases(double seconds);
   bool inertial_usable() const;
 
   // IMU: imu_update.cpp.
-  void update(const ImuSample& sample);
+  void update(const ImuSample& by_own_clock);
+  void use_waiting_until(Stamp stamp);
+  ImuSample at_frame_time(const ImuSample& by_own_clock) const;
+  void use(const ImuSample& sample);
   void check_reading(const ImuSample& sample);
   void level(const ImuSample& sample);
   void search_alignment(const ImuSample& sample);

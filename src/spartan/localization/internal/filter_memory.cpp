@@ -58,12 +58,29 @@ struct Get {
   }
 };
 
+void visit_queue(Put& put, const ImuQueue& queue) {
+  put(queue.size());
+  for (std::uint32_t i = 0; i < queue.size(); ++i)
+    put(queue[i].stamp), put(queue[i].gyro_rad_s), put(queue[i].accel_m_s2);
+}
+
+void visit_queue(Get& get, ImuQueue& queue) {
+  std::uint32_t count = 0;
+  get(count);
+  get.plausible = get.plausible && count <= ImuQueue::kCapacity;
+  for (std::uint32_t i = 0; i < std::min(count, ImuQueue::kCapacity); ++i) {
+    ImuSample sample;
+    get(sample.stamp), get(sample.gyro_rad_s), get(sample.accel_m_s2);
+    queue.push(sample);
+  }
+}
+
 // Lists every field once, for writing and reading.
 template <class Each, class State>
 void visit_state(Each& each, State& s) {
   each(s.world_from_body), each(s.velocity_m_s), each(s.gyro_bias_rad_s), each(s.accel_bias_m_s2);
-  each(s.gravity_tilt_rad), each(s.gravity_scale), each(s.wheel_scale), each(s.compass_offset_rad),
-      each(s.inclinometer_bias_rad);
+  each(s.gravity_tilt_rad), each(s.gravity_scale), each(s.imu_time_offset_s), each(s.wheel_scale);
+  each(s.compass_offset_rad), each(s.inclinometer_bias_rad);
   each(s.vision_drift), each(s.vision_constant), each(s.calibration), each(s.world_from_vision_clone),
       each(s.world_from_step_clone);
 }
@@ -77,7 +94,7 @@ template <class Each, class Inertial>
 void visit_preintegration(Each& each, Inertial& p) {
   each(p.seconds), each(p.gyro_bias_rad_s), each(p.accel_bias_m_s2), each(p.rotation), each(p.velocity);
   each(p.position), each(p.rotation_by_gyro), each(p.velocity_by_gyro), each(p.velocity_by_accel);
-  each(p.position_by_gyro), each(p.position_by_accel), each(p.covariance);
+  each(p.position_by_gyro), each(p.position_by_accel), each(p.by_time), each(p.covariance);
 }
 
 template <class Each, class Segment>
@@ -96,6 +113,7 @@ void visit_window(Each& each, Window& w) {
 template <class Each, class Imu>
 void visit_imu(Each& each, Imu& m) {
   each(m.known), each(m.last.stamp), each(m.last.gyro_rad_s), each(m.last.accel_m_s2), each(m.changed);
+  visit_queue(each, m.waiting);
   each(m.noise.gyro_variance), each(m.noise.accel_variance), each(m.noise.seconds), each(m.noise.interval_s);
   each(m.level_from), each(m.level_count), each(m.level_force_sum);
   each(m.aligned), each(m.waiting_since), visit_window(each, m.window.state());

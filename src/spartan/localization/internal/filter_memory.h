@@ -9,6 +9,7 @@
 #include "spartan/core/archive.h"
 #include "spartan/localization/internal/alignment_window.h"
 #include "spartan/localization/internal/error_state.h"
+#include "spartan/localization/internal/imu_queue.h"
 #include "spartan/localization/internal/inertial_noise.h"
 #include "spartan/localization/localizer.h"
 
@@ -26,8 +27,9 @@ struct StationaryBlock {
 
 struct InertialMemory {
   bool known = false;
-  ImuSample last;
-  Stamp changed;  ///< when the reading last changed (frozen sensors)
+  ImuSample last;    ///< its stamp by the clock of the cameras
+  ImuQueue waiting;  ///< by the clock of the IMU
+  Stamp changed;     ///< when the reading last changed (frozen sensors)
   InertialNoiseEstimate noise;
   bool aligned = false;  ///< biases, velocity and gravity are known well enough for integration
   Stamp waiting_since;   ///< begin of the search for the alignment

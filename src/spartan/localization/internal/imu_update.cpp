@@ -1,5 +1,6 @@
 // IMU samples: checks, levelling, alignment and the detection of a stationary rover.
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "spartan/localization/internal/error_state_filter.h"
@@ -19,7 +20,42 @@ constexpr double kSlowAlignment_s = 10;
 
 }  // namespace
 
-void ErrorStateFilter::update(const ImuSample& sample) {
+bool is_possible(const ImuSample& sample) {
+  return sample.gyro_rad_s.cwiseAbs().maxCoeff() < kMaxRate_rad_s &&
+         sample.accel_m_s2.cwiseAbs().maxCoeff() < kMaxForce_m_s2;
+}
+
+void ErrorStateFilter::update(const ImuSample& by_own_clock) {
+  ImuQueue& waiting = memory_.imu.waiting;
+  if (waiting.full()) use_waiting_until(at_frame_time(waiting.front()).stamp);
+  waiting.push(by_own_clock);
+  Stamp reached = by_own_clock.stamp;
+  reached.ns -= std::llround(options_.imu.max_time_error_s() * 1e9);
+  use_waiting_until(reached);
+}
+
+/// Uses the readings that were taken up to that time.
+void ErrorStateFilter::use_waiting_until(Stamp stamp) {
+  ImuQueue& waiting = memory_.imu.waiting;
+  while (!waiting.empty()) {
+    const ImuSample sample = at_frame_time(waiting.front());
+    if (sample.stamp > stamp) return;
+    waiting.pop();
+    use(sample);
+  }
+}
+
+/// With the stamp by the clock of the cameras, as far as it is known; not before the present.
+ImuSample ErrorStateFilter::at_frame_time(const ImuSample& by_own_clock) const {
+  const double limit = options_.imu.max_time_error_s();
+  const double offset_s = std::clamp(memory_.estimate.state.imu_time_offset_s, -limit, limit);
+  ImuSample sample = by_own_clock;
+  sample.stamp.ns -= std::llround(offset_s * 1e9);
+  if (limit > 0) sample.stamp = std::max(sample.stamp, memory_.stamp);
+  return sample;
+}
+
+void ErrorStateFilter::use(const ImuSample& sample) {
   check_reading(sample);
   InertialMemory& imu = memory_.imu;
   if (imu.known) {
@@ -45,8 +81,7 @@ void ErrorStateFilter::check_reading(const ImuSample& sample) {
   InertialMemory& imu = memory_.imu;
   const bool same = imu.known && imu.last.gyro_rad_s == sample.gyro_rad_s && imu.last.accel_m_s2 == sample.accel_m_s2;
   if (!same) imu.changed = sample.stamp;
-  const bool possible = sample.gyro_rad_s.cwiseAbs().maxCoeff() < kMaxRate_rad_s &&
-                        sample.accel_m_s2.cwiseAbs().maxCoeff() < kMaxForce_m_s2;
+  const bool possible = is_possible(sample);
   const bool frozen = same && seconds_between(imu.changed, sample.stamp) >= options_.imu.frozen_s;
   if (!possible || frozen) {
     ++monitor.rejected;
@@ -98,8 +133,12 @@ void ErrorStateFilter::search_alignment(const ImuSample& sample) {
 /// The vertical counts little, because it is corrected by what is found; it makes a single motion enough.
 AlignmentPrior ErrorStateFilter::alignment_prior() const {
   constexpr double kUpFactor = 3;
-  AlignmentPrior prior{options_.imu.gyro_bias_sigma_rad_s, options_.imu.accel_bias_sigma_m_s2, options_.gravity_m_s2,
-                       std::nullopt, 0};
+  AlignmentPrior prior{options_.imu.gyro_bias_sigma_rad_s,
+                       options_.imu.accel_bias_sigma_m_s2,
+                       options_.gravity_m_s2,
+                       std::sqrt(memory_.estimate.covariance(error_at::kImuTime, error_at::kImuTime)),
+                       std::nullopt,
+                       0};
   if (!memory_.gravity_known) return prior;
   const UpInBody up = up_in_body(memory_.estimate.state, error_at::kVisionClone);
   const Eigen::Matrix3d covariance = up.jacobian * memory_.estimate.covariance * up.jacobian.transpose();
@@ -118,14 +157,20 @@ void ErrorStateFilter::align(const InertialAlignment& a) {
   s.accel_bias_m_s2 = a.accel_bias_m_s2;
   if (!memory_.gravity_known) s.gravity_tilt_rad = tilt_of_up(s.world_from_vision_clone.rotation() * a.up);
 
-  constexpr int kFirst = error_at::kVelocity, kCount = 9;
-  static_assert(error_at::kGyroBias == kFirst + 3 && error_at::kAccelBias == kFirst + 6);
-  Eigen::Matrix<double, kCount, 12> selection = Eigen::Matrix<double, kCount, 12>::Zero();
+  s.imu_time_offset_s += a.time_offset_s;
+
+  // Velocity, biases and clock, in the order of the state.
+  constexpr int kCount = 10;
+  Eigen::Array<int, kCount, 1> at;
+  at << Eigen::Array<int, 9, 1>::LinSpaced(error_at::kVelocity, error_at::kVelocity + 8), error_at::kImuTime;
+  static_assert(error_at::kGyroBias == error_at::kVelocity + 3 && error_at::kAccelBias == error_at::kVelocity + 6);
+  Eigen::Matrix<double, kCount, 13> selection = Eigen::Matrix<double, kCount, 13>::Zero();
   selection.block<3, 3>(0, 6).setIdentity();
   selection.block<6, 6>(3, 0).setIdentity();
-  p.middleRows<kCount>(kFirst).setZero();
-  p.middleCols<kCount>(kFirst).setZero();
-  p.block<kCount, kCount>(kFirst, kFirst) = selection * a.covariance * selection.transpose();
+  selection(9, 12) = 1;
+  p(at, Eigen::all).setZero();
+  p(Eigen::all, at).setZero();
+  p(at, at) = selection * a.covariance * selection.transpose();
 
   const Eigen::Vector3d side = a.up.unitOrthogonal();
   Eigen::Matrix<double, 2, 3> directions;
@@ -134,10 +179,10 @@ void ErrorStateFilter::align(const InertialAlignment& a) {
   Innovation innovation(2);
   innovation.residual = directions * (a.up - up.up);
   innovation.jacobian = directions * up.jacobian;
-  innovation.noise = directions * a.covariance.bottomRightCorner<3, 3>() * directions.transpose();
+  innovation.noise = directions * a.covariance.block<3, 3>(9, 9) * directions.transpose();
   innovation.noise.diagonal().array() += 1e-10;
   innovation.shared = Eigen::Matrix<double, error_at::kSize, 2>::Zero();
-  innovation.shared.middleRows<kCount>(kFirst) = -selection * a.covariance.rightCols<3>() * directions.transpose();
+  innovation.shared(at, Eigen::all) = -selection * a.covariance.middleCols<3>(9) * directions.transpose();
   correct_world(innovation);
   memory_.imu.aligned = memory_.gravity_known = true;
   memory_.imu.window = {};

@@ -15,15 +15,16 @@ constexpr double kMaxBiasChiSquare = 22.5;
 constexpr double kMaxNoiseFactor = 9;
 constexpr int kIterations = 5;
 /// Index of the first unknown of each part; the velocities follow, three for each frame.
-constexpr int kGyro = 0, kAccel = 3, kUp = 6, kVelocities = 8;
+constexpr int kGyro = 0, kAccel = 3, kUp = 6, kTime = 8, kVelocities = 9;
 
 using Vector9d = Eigen::Matrix<double, 9, 1>;
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
 struct Unknowns {
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero(), accel_bias = Eigen::Vector3d::Zero();
-  Eigen::Vector3d up;                         // in the first body frame, as are the velocities
-  Eigen::Matrix<double, 3, 2> basis;          // of the plane normal to `up`
+  Eigen::Vector3d up;                 // in the first body frame, as are the velocities
+  Eigen::Matrix<double, 3, 2> basis;  // of the plane normal to `up`
+  double time = 0;
   std::vector<Eigen::Vector3d> velocities{};  // at the frames
 
   void set_up(const Eigen::Vector3d& direction) {
@@ -58,7 +59,7 @@ Unknowns first_guess(std::span<const AlignmentSegment> segments, const std::vect
 
 struct Equation {
   Vector9d residual;
-  Eigen::Matrix<double, 9, 8> by_common;                      // biases, up
+  Eigen::Matrix<double, 9, 9> by_common;                      // biases, up, time
   Eigen::Matrix<double, 9, 3> by_velocity, by_next_velocity;  // of both frames
   Matrix9d covariance;
 };
@@ -85,6 +86,8 @@ Equation equation_of(const AlignmentSegment& s, const Eigen::Matrix3d& attitude,
   e.by_common.block<3, 3>(6, kAccel) = imu.position_by_accel;
   e.by_common.block<3, 2>(3, kUp) = -gravity * t * back * x.basis;
   e.by_common.block<3, 2>(6, kUp) = -0.5 * gravity * t * t * back * x.basis;
+  e.residual -= x.time * imu.by_time;
+  e.by_common.col(kTime) = imu.by_time;
   e.by_velocity << Eigen::Matrix3d::Zero(), back, t * back;
   e.by_next_velocity << Eigen::Matrix3d::Zero(), -back, Eigen::Matrix3d::Zero();
   // The motion's right perturbation (ρ, φ): D Exp(φ), d + D ρ.
@@ -116,6 +119,10 @@ NormalEquations normal_equations(std::span<const AlignmentSegment> segments,
   add_prior(kGyro, x.gyro_bias, prior.gyro_bias_rad_s);
   add_prior(kAccel, x.accel_bias, prior.accel_bias_m_s2);
   n.chi_square = n.bias_chi_square;
+  const double time_weight = 1 / std::max(prior.time_s * prior.time_s, 1e-18);
+  n.matrix(kTime, kTime) += time_weight;
+  n.vector[kTime] -= time_weight * x.time;
+  n.chi_square += time_weight * x.time * x.time;
   if (prior.up) {
     const double weight = 1 / (prior.up_sigma_rad * prior.up_sigma_rad);
     const Eigen::Vector2d off = x.basis.transpose() * (attitude.back() * *prior.up);
@@ -123,22 +130,23 @@ NormalEquations normal_equations(std::span<const AlignmentSegment> segments,
     n.vector.segment<2>(kUp) += weight * off;
     n.chi_square += weight * off.squaredNorm();
   }
-  Eigen::Matrix<double, 9, 14> jacobian;
+  constexpr int kAll = kVelocities + 6;
+  Eigen::Matrix<double, 9, kAll> jacobian;
   for (std::size_t k = 0; k < segments.size(); ++k) {
     const Equation e = equation_of(segments[k], attitude[k], x, k, prior.gravity_m_s2);
     const Eigen::LLT<Matrix9d> llt(e.covariance);
     jacobian << e.by_common, e.by_velocity, e.by_next_velocity;
-    const Eigen::Matrix<double, 9, 14> white = llt.matrixL().solve(jacobian);
+    const Eigen::Matrix<double, 9, kAll> white = llt.matrixL().solve(jacobian);
     const Vector9d residual = llt.matrixL().solve(e.residual);
     n.chi_square += residual.squaredNorm();
-    const Eigen::Matrix<double, 14, 14> square = white.transpose() * white;
-    const Eigen::Matrix<double, 14, 1> right = white.transpose() * residual;
+    const Eigen::Matrix<double, kAll, kAll> square = white.transpose() * white;
+    const Eigen::Matrix<double, kAll, 1> right = white.transpose() * residual;
     const auto v = static_cast<Eigen::Index>(kVelocities + 3 * k);
-    n.matrix.topLeftCorner<8, 8>() += square.topLeftCorner<8, 8>();
-    n.matrix.block<8, 6>(0, v) += square.topRightCorner<8, 6>();
-    n.matrix.block<6, 8>(v, 0) += square.bottomLeftCorner<6, 8>();
+    n.matrix.topLeftCorner<kVelocities, kVelocities>() += square.topLeftCorner<kVelocities, kVelocities>();
+    n.matrix.block<kVelocities, 6>(0, v) += square.topRightCorner<kVelocities, 6>();
+    n.matrix.block<6, kVelocities>(v, 0) += square.bottomLeftCorner<6, kVelocities>();
     n.matrix.block<6, 6>(v, v) += square.bottomRightCorner<6, 6>();
-    n.vector.head<8>() += right.head<8>();
+    n.vector.head<kVelocities>() += right.head<kVelocities>();
     n.vector.segment<6>(v) += right.tail<6>();
   }
   return n;
@@ -148,6 +156,7 @@ void step(Unknowns& x, const Eigen::VectorXd& by) {
   x.gyro_bias += by.segment<3>(kGyro);
   x.accel_bias += by.segment<3>(kAccel);
   x.set_up(x.up + x.basis * by.segment<2>(kUp));
+  x.time += by[kTime];
   for (std::size_t k = 0; k < x.velocities.size(); ++k)
     x.velocities[k] += by.segment<3>(static_cast<Eigen::Index>(kVelocities + 3 * k));
 }
@@ -170,7 +179,7 @@ std::optional<InertialAlignment> align_inertially(std::span<const AlignmentSegme
   if (!(n.bias_chi_square <= kMaxBiasChiSquare)) return std::nullopt;
   // 9 residuals of each segment and those of the prior, less the unknowns.
   const double freedom =
-      9.0 * static_cast<double>(segments.size()) + (prior.up ? 8 : 6) - static_cast<double>(n.vector.size());
+      9.0 * static_cast<double>(segments.size()) + (prior.up ? 9 : 7) - static_cast<double>(n.vector.size());
   InertialAlignment r;
   r.noise_factor = std::max(1.0, n.chi_square / freedom);
   if (!(r.noise_factor <= kMaxNoiseFactor)) return std::nullopt;
@@ -178,14 +187,16 @@ std::optional<InertialAlignment> align_inertially(std::span<const AlignmentSegme
   if (llt.info() != Eigen::Success) return std::nullopt;
 
   const Eigen::Matrix3d to_last = attitude.back().transpose();
-  Eigen::MatrixXd by_unknowns = Eigen::MatrixXd::Zero(12, n.vector.size());
+  Eigen::MatrixXd by_unknowns = Eigen::MatrixXd::Zero(13, n.vector.size());
   by_unknowns.block<6, 6>(0, 0).setIdentity();
   by_unknowns.block<3, 3>(6, n.vector.size() - 3) = to_last;
   by_unknowns.block<3, 2>(9, kUp) = to_last * x.basis;
+  by_unknowns(12, kTime) = 1;
   const Eigen::MatrixXd half = llt.matrixL().solve(by_unknowns.transpose());
   r.covariance = r.noise_factor * half.transpose() * half;
   r.gyro_bias_rad_s = x.gyro_bias;
   r.accel_bias_m_s2 = x.accel_bias;
+  r.time_offset_s = x.time;
   r.velocity_m_s = to_last * x.velocities.back();
   r.up = to_last * x.up;
   return r;

@@ -66,7 +66,7 @@ VisualMotion ErrorStateFilter::of_imu(const RelativeMotion& motion) const {
 void ErrorStateFilter::update(const RelativeMotion& of_body) {
   const VisualMotion visual = of_imu(of_body);
   const RelativeMotion& motion = visual.motion;
-  propagate_to(motion.to, nullptr);
+  advance_to(motion.to);
   SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
   const bool consecutive = motion.from == memory_.vision.clone_stamp;
   if (!motion.measured || !consecutive) {

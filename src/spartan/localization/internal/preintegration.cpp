@@ -8,6 +8,7 @@ namespace spartan::internal {
 //   φ' = Exp(θ)ᵀ φ − J_r(θ) t δb_g
 //   δa = −½ (ΔR [f₀]× φ + ΔR' [f₁]× φ') − ½ (ΔR + ΔR') δb_a
 //   δv' = δv + t δa,   δp' = δp + t δv + ½ t² δa
+// Readings later by ε are those with the biases −ε (ω₁ − ω₀)/t and −ε (f₁ − f₀)/t.
 void Preintegration::add(const InertialStep& step, const InertialNoise& noise) {
   const double t = step.seconds;
   const Eigen::Vector3d angle = (0.5 * (step.gyro_from + step.gyro_to) - gyro_bias_rad_s) * t;
@@ -21,6 +22,17 @@ void Preintegration::add(const InertialStep& step, const InertialNoise& noise) {
   const Eigen::Matrix3d rotation_after = turn.transpose() * rotation_by_gyro - right_jacobian * t;
   const Eigen::Matrix3d accel_by_gyro = accel_by_before * rotation_by_gyro + accel_by_after * rotation_after;
   position += t * velocity + 0.5 * t * t * accel;
+  const Eigen::Vector3d gyro_by_time = (step.gyro_to - step.gyro_from) / -t,
+                        accel_change = (step.accel_to - step.accel_from) / -t;
+  const Eigen::Vector3d rotation_by_time = by_time.head<3>();
+  const Eigen::Vector3d rotation_by_time_after =
+      turn.transpose() * rotation_by_time - right_jacobian * t * gyro_by_time;
+  const Eigen::Vector3d accel_by_time =
+      accel_by_before * rotation_by_time + accel_by_after * rotation_by_time_after + accel_by_accel * accel_change;
+  by_time.tail<3>() += t * by_time.segment<3>(3) + 0.5 * t * t * accel_by_time;
+  by_time.segment<3>(3) += t * accel_by_time;
+  by_time.head<3>() = rotation_by_time_after;
+
   position_by_gyro += t * velocity_by_gyro + 0.5 * t * t * accel_by_gyro;
   position_by_accel += t * velocity_by_accel + 0.5 * t * t * accel_by_accel;
   velocity += t * accel;

@@ -25,6 +25,9 @@ struct Preintegration {
   Eigen::Matrix3d rotation_by_gyro = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d velocity_by_gyro = Eigen::Matrix3d::Zero(), velocity_by_accel = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d position_by_gyro = Eigen::Matrix3d::Zero(), position_by_accel = Eigen::Matrix3d::Zero();
+  /// Of (rotation, velocity, position) by the time at which the readings are taken: how much each changes if all
+  /// readings are those of 1 s later.
+  Eigen::Matrix<double, 9, 1> by_time = Eigen::Matrix<double, 9, 1>::Zero();
   /// Of (rotation, velocity, position), by white noise.
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
 

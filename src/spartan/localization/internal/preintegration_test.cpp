@@ -75,6 +75,27 @@ TEST(Preintegration, DerivativesByTheBiasesMatchFiniteDifferences) {
   EXPECT_LE((ours - numeric).cwiseAbs().maxCoeff(), 1e-6);
 }
 
+TEST(Preintegration, DerivativeByTheTimeOfTheReadingsMatchesFiniteDifferences) {
+  const auto steps = random_steps(26, 40);
+  const Preintegration p = integrated(steps, {0.02, -0.05, 0.03}, {0.1, 0.2, -0.1});
+  const auto numeric = testing::numeric_jacobian<9, 1>(
+      [&](const Eigen::Matrix<double, 1, 1>& later) {
+        std::vector<InertialStep> shifted = steps;
+        for (InertialStep& s : shifted) {
+          const Eigen::Vector3d gyro = later[0] / s.seconds * (s.gyro_to - s.gyro_from),
+                                accel = later[0] / s.seconds * (s.accel_to - s.accel_from);
+          s.gyro_from += gyro, s.gyro_to += gyro, s.accel_from += accel, s.accel_to += accel;
+        }
+        const Preintegration q = integrated(shifted, p.gyro_bias_rad_s, p.accel_bias_m_s2);
+        Eigen::Matrix<double, 9, 1> v;
+        v << log_so3(Eigen::Quaterniond(p.rotation.transpose() * q.rotation)), q.velocity, q.position;
+        return v;
+      },
+      Eigen::Matrix<double, 1, 1>::Zero());
+  EXPECT_LE((p.by_time - numeric).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_GT(p.by_time.norm(), 0.1);
+}
+
 // Oracle: the scatter of noisy integrations.
 TEST(Preintegration, CovarianceIsThatOfNoisyReadings) {
   const auto steps = random_steps(24, 30);

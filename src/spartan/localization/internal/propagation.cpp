@@ -18,7 +18,7 @@ void add_white_noise(Transition& t, const Eigen::Vector3d& accel_variance, const
 Transition identity_transition() {
   Transition t;
   t.by_moving.setIdentity();
-  t.by_gravity.setZero();
+  t.by_constants.setZero();
   t.noise.setZero();
   return t;
 }
@@ -84,8 +84,15 @@ Transition transition(const NavigationState& s, const InertialStep& step, const 
   r.by_moving.middleRows<3>(error_at::kVelocity) = to_body * (velocity + t * accel) + skew(after) * rotation;
   r.by_moving.middleRows<3>(error_at::kPosition) = to_body * (t * velocity + 0.5 * t * t * accel);
   r.by_moving.block<3, 3>(error_at::kPosition, error_at::kPosition) = back;
-  r.by_gravity.middleRows<3>(error_at::kVelocity) = t * to_body * accel_by_gravity;
-  r.by_gravity.middleRows<3>(error_at::kPosition) = 0.5 * t * t * to_body * accel_by_gravity;
+  r.by_constants.block<3, 3>(error_at::kVelocity, 0) = t * to_body * accel_by_gravity;
+  r.by_constants.block<3, 3>(error_at::kPosition, 0) = 0.5 * t * t * to_body * accel_by_gravity;
+  // A clock that is off by ε adds ε (ω₁ − ω₀)/t and ε (f₁ − f₀)/t to the readings, where a bias subtracts.
+  static_assert(error_at::kGyroBias == 9);
+  const auto by_biases = r.by_moving.topRows<error_at::kGyroBias>();
+  r.by_constants.col(3).head<error_at::kGyroBias>() =
+      -1 / t *
+      (by_biases.middleCols<3>(error_at::kGyroBias) * (step.gyro_to - step.gyro_from) +
+       by_biases.middleCols<3>(error_at::kAccelBias) * (step.accel_to - step.accel_from));
 
   add_white_noise(r, noise.accel.cwiseAbs2(), noise.gyro.cwiseAbs2(), t);
   r.noise.block<3, 3>(error_at::kGyroBias, error_at::kGyroBias).diagonal().array() +=
@@ -124,10 +131,10 @@ void propagate_covariance(ErrorCovariance& p, const Transition& t) {
   constexpr int kRest = error_at::kSize - error_at::kMoving;
   Eigen::Matrix<double, error_at::kMoving, error_at::kSize> rows;
   rows.noalias() = t.by_moving * p.topRows<error_at::kMoving>();
-  rows.noalias() += t.by_gravity * p.middleRows<3>(error_at::kGravityTilt);
+  rows.noalias() += t.by_constants * p.middleRows<4>(error_at::kGravityTilt);
   Eigen::Matrix<double, error_at::kMoving, error_at::kMoving> square =
       rows.leftCols<error_at::kMoving>() * t.by_moving.transpose();
-  square.noalias() += rows.middleCols<3>(error_at::kGravityTilt) * t.by_gravity.transpose();
+  square.noalias() += rows.middleCols<4>(error_at::kGravityTilt) * t.by_constants.transpose();
   square += t.noise;
   p.topLeftCorner<error_at::kMoving, error_at::kMoving>() = 0.5 * (square + square.transpose());
   p.topRightCorner<error_at::kMoving, kRest>() = rows.rightCols<kRest>();

@@ -29,11 +29,11 @@ struct ConstantVelocityNoise {
   double velocity_m_s_sqrt_hz = 0, attitude_rad_sqrt_hz = 0;
 };
 
-/// The propagated part of the error after a step: by_moving · moving part + by_gravity · (gravity tilt, gravity scale)
-/// + noise of covariance `noise`.
+/// The propagated part of the error after a step: by_moving · moving part + by_constants · (gravity tilt, gravity
+/// scale, clock of the IMU) + noise of covariance `noise`.
 struct Transition {
   Eigen::Matrix<double, error_at::kMoving, error_at::kMoving> by_moving;
-  Eigen::Matrix<double, error_at::kMoving, 3> by_gravity;
+  Eigen::Matrix<double, error_at::kMoving, 4> by_constants;
   Eigen::Matrix<double, error_at::kMoving, error_at::kMoving> noise;
 };
 

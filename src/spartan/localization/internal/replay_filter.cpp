@@ -1,6 +1,7 @@
 #include "spartan/localization/internal/replay_filter.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 namespace spartan::internal {
@@ -118,21 +119,22 @@ std::optional<Measurement> get_measurement(ArchiveReader& in) {
 
 }  // namespace
 
-ReplayFilter::ReplayFilter(const LocalizationOptions& options) : options_(options), filter_(options) {}
+ReplayFilter::ReplayFilter(const LocalizationOptions& options)
+    : options_(options), lead_ns_(std::llround(options.imu.max_time_error_s() * 1e9)), filter_(options) {}
 
 void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
                          const std::optional<Eigen::Vector3d>& up_in_body, const Eigen::Vector3d& assumed_up_in_body) {
   if (started()) throw std::logic_error("Localizer::start: called twice");
   std::erase_if(entries_, [&](const Measurement& m) { return std::abs(age(m, stamp)) > kBeforeStart_s; });
-  const auto later = std::partition_point(entries_.begin(), entries_.end(),
-                                          [&](const Measurement& m) { return stamp_of_measurement(m) <= stamp; });
+  const auto later = std::stable_partition(entries_.begin(), entries_.end(),
+                                           [&](const Measurement& m) { return stamp_of_measurement(m) <= stamp; });
   filter_.start(stamp, ahead_in_body, std::span(entries_.data(), static_cast<std::size_t>(later - entries_.begin())),
                 up_in_body, assumed_up_in_body);
   entries_.erase(entries_.begin(), later);
   start_ = newest_ = stamp;
   for (const Measurement& m : entries_) newest_ = std::max(newest_, stamp_of_measurement(m));
   snapshots_ = {{0, filter_.memory()}};
-  run_from(0);
+  run();
 }
 
 bool ReplayFilter::reaches(Stamp stamp) const {
@@ -156,7 +158,8 @@ std::optional<Refusal> ReplayFilter::add_before_start(const Measurement& m) {
   }
   isolated_.reset();
   if (!place(m)) return Refusal::duplicate;
-  newest_ = stamp_of_measurement(entries_.back());
+  newest_ = {};
+  for (const Measurement& e : entries_) newest_ = std::max(newest_, stamp_of_measurement(e));
   std::erase_if(entries_, [&](const Measurement& e) { return age(e, newest_) > kBeforeStart_s; });
   return std::nullopt;
 }
@@ -190,12 +193,24 @@ void ReplayFilter::undo_leap(Stamp arrived) {
   entries_.pop_back();
   newest_ = before;
   ++undone_leaps_;
-  replay_from(entries_.size());
+  replay_from(std::min(processed_, entries_.size()));
+}
+
+/// When a measurement is processed.
+Stamp ReplayFilter::turn_of(const Measurement& m) const {
+  const Stamp stamp = stamp_of_measurement(m);
+  return std::holds_alternative<ImuSample>(m) ? Stamp{stamp.ns - lead_ns_} : stamp;
+}
+
+bool ReplayFilter::precedes(const Measurement& a, const Measurement& b) const {
+  const Stamp at = turn_of(a), bt = turn_of(b);
+  return at != bt ? at < bt : a.index() < b.index();
 }
 
 std::optional<std::size_t> ReplayFilter::place(const Measurement& m) {
-  const auto at = std::lower_bound(entries_.begin(), entries_.end(), m, comes_before);
-  if (at != entries_.end() && !comes_before(m, *at)) return std::nullopt;
+  const auto at = std::lower_bound(entries_.begin(), entries_.end(), m,
+                                   [this](const Measurement& a, const Measurement& b) { return precedes(a, b); });
+  if (at != entries_.end() && !precedes(m, *at)) return std::nullopt;
   const auto index = static_cast<std::size_t>(at - entries_.begin());  // insert() invalidates the iterator
   entries_.insert(at, m);
   return index;
@@ -206,10 +221,10 @@ std::optional<Refusal> ReplayFilter::insert(const Measurement& m) {
   if (!at) return Refusal::duplicate;
   if (seconds_between(newest_, stamp_of_measurement(m)) > lead_s()) before_leap_ = newest_;
   newest_ = std::max(newest_, stamp_of_measurement(m));
-  if (*at + 1 == entries_.size()) {
-    run_from(*at);
-  } else {
+  if (*at < processed_) {
     replay_from(*at);
+  } else {
+    run();
   }
   discard_old();
   return std::nullopt;
@@ -217,20 +232,21 @@ std::optional<Refusal> ReplayFilter::insert(const Measurement& m) {
 
 bool ReplayFilter::opens_cell(std::size_t entry) const {
   if (entry == 0) return false;
-  return cell_of(stamp_of_measurement(entries_[entry])) != cell_of(stamp_of_measurement(entries_[entry - 1]));
+  return cell_of(turn_of(entries_[entry])) != cell_of(turn_of(entries_[entry - 1]));
 }
 
 std::optional<ErrorStateFilter> ReplayFilter::at(Stamp stamp) const {
   if (!started() || stamp < snapshots_.front().memory.stamp) return std::nullopt;
   ErrorStateFilter filter = filter_;
+  std::size_t first = processed_;
   if (stamp < filter_.memory().stamp) {
     const auto later = std::partition_point(snapshots_.begin() + 1, snapshots_.end(),
                                             [&](const Snapshot& s) { return s.memory.stamp <= stamp; });
     const Snapshot& from = *(later - 1);
     filter.set_memory(from.memory);
-    for (std::size_t i = from.count; i < entries_.size() && stamp_of_measurement(entries_[i]) <= stamp; ++i)
-      filter.process(entries_[i]);
+    first = from.count;
   }
+  for (std::size_t i = first; i < entries_.size() && turn_of(entries_[i]) <= stamp; ++i) filter.process(entries_[i]);
   filter.predict_to(stamp);
   return filter;
 }
@@ -238,16 +254,26 @@ std::optional<ErrorStateFilter> ReplayFilter::at(Stamp stamp) const {
 void ReplayFilter::replay_from(std::size_t entry) {
   while (snapshots_.size() > 1 && snapshots_.back().count >= entry) snapshots_.pop_back();
   filter_.set_memory(snapshots_.back().memory);
-  const std::size_t from = snapshots_.back().count;
-  if (snapshots_.size() > 1) snapshots_.pop_back();  // run_from() takes it again
-  run_from(from);
+  processed_ = snapshots_.back().count;
+  if (snapshots_.size() > 1) snapshots_.pop_back();  // run() takes it again
+  run();
 }
 
-void ReplayFilter::run_from(std::size_t entry) {
-  for (; entry < entries_.size(); ++entry) {
-    if (opens_cell(entry)) snapshots_.push_back({entry, filter_.memory()});
-    filter_.process(entries_[entry]);
+/// Processes what no sample of the IMU with a newer stamp will precede.
+void ReplayFilter::run() {
+  const Stamp until{newest_.ns - lead_ns_};
+  for (; processed_ < entries_.size() && turn_of(entries_[processed_]) <= until; ++processed_) {
+    if (opens_cell(processed_)) snapshots_.push_back({processed_, filter_.memory()});
+    filter_.process(entries_[processed_]);
   }
+}
+
+ErrorStateFilter ReplayFilter::newest() const {
+  ErrorStateFilter filter = filter_;
+  if (!started()) return filter;
+  for (std::size_t i = processed_; i < entries_.size(); ++i) filter.process(entries_[i]);
+  filter.predict_to(newest_);
+  return filter;
 }
 
 /// Discards snapshots and entries that are older than any sample that is still accepted.
@@ -259,6 +285,7 @@ void ReplayFilter::discard_old() {
     ++first;
   if (first == 0) return;
   const std::size_t gone = snapshots_[first].count;
+  processed_ -= gone;
   entries_.erase(entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(gone));
   snapshots_.erase(snapshots_.begin(), snapshots_.begin() + static_cast<std::ptrdiff_t>(first));
   for (Snapshot& snapshot : snapshots_) snapshot.count -= gone;
@@ -296,7 +323,7 @@ bool ReplayFilter::get(ArchiveReader& in) {
   for (std::uint64_t i = 0; i < count; ++i) {
     const auto m = get_measurement(in);
     if (!m || !is_valid(*m)) return false;
-    if (!entries_.empty() && !comes_before(entries_.back(), *m)) return false;
+    if (!entries_.empty() && !precedes(entries_.back(), *m)) return false;
     entries_.push_back(*m);
   }
   if (!in.ok()) return false;
@@ -304,7 +331,8 @@ bool ReplayFilter::get(ArchiveReader& in) {
   snapshots_.clear();
   if (!has_started || !memory->started) return has_started == memory->started;
   snapshots_ = {{0, *memory}};
-  run_from(0);
+  processed_ = 0;
+  run();
   return true;
 }
 

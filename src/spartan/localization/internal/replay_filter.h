@@ -23,7 +23,8 @@ class ReplayFilter {
   bool started() const { return filter_.memory().started; }
 
   /// Returns nothing if the measurement was accepted, else the reason. Whatever the order of arrival, the state is bit
-  /// for bit that of the accepted measurements in the order of comes_before(). A constraint on the pose at the last
+  /// for bit that of the accepted measurements in the order of comes_before(), where those of the IMU come earlier by
+  /// InertialOptions::max_time_error_s. A constraint on the pose at the last
   /// frame is never too late: if that frame is older than the buffer, the constraint is applied at the far end of the
   /// buffer.
   std::optional<Refusal> add(const Measurement& measurement);
@@ -34,8 +35,10 @@ class ReplayFilter {
   /// Whether a sample with that stamp would not be too late; false before the start.
   bool reaches(Stamp stamp) const;
 
-  const ErrorStateFilter& filter() const { return filter_; }
-  /// The filter at a time of the buffer, as if later samples had not come; at a later time, its prediction. Nothing
+  /// The filter at the newest sample.
+  ErrorStateFilter newest() const;
+  /// The filter at a time of the buffer, as if later samples had not come (but for the IMU, whose clock may be off); at
+  /// a later time, its prediction. Nothing
   /// before the buffer or before the start.
   std::optional<ErrorStateFilter> at(Stamp stamp) const;
 
@@ -54,17 +57,21 @@ class ReplayFilter {
   std::optional<Refusal> add_started(const Measurement& measurement);
   /// Inserts into the entries without processing; returns the index, or nothing for a duplicate.
   std::optional<std::size_t> place(const Measurement& measurement);
+  Stamp turn_of(const Measurement& measurement) const;
+  bool precedes(const Measurement& a, const Measurement& b) const;
   std::optional<Refusal> insert(const Measurement& measurement);
   void undo_leap(Stamp arrived);
   double lead_s() const;
   bool opens_cell(std::size_t entry) const;
   void replay_from(std::size_t entry);
-  void run_from(std::size_t entry);
+  void run();
   void discard_old();
 
   LocalizationOptions options_;
+  std::int64_t lead_ns_;  ///< a sample of the IMU may be needed this long before its stamp
   ErrorStateFilter filter_;
-  std::vector<Measurement> entries_;  ///< in the order of comes_before()
+  std::vector<Measurement> entries_;  ///< in the order of precedes()
+  std::size_t processed_ = 0;         ///< entries that the filter has processed; those after are newer than lead_ns_
   std::vector<Snapshot> snapshots_;
   Stamp start_, newest_;
   std::optional<Stamp> isolated_;  ///< stamp of the sample before if it was refused as far from all others

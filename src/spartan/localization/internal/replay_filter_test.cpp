@@ -58,7 +58,7 @@ const Bytes& in_order_result() {
   static const Bytes bytes = [] {
     ReplayFilter filter = started_filter(test_options());
     for (const Measurement& m : after_start()) filter.add(m);
-    return bytes_of(filter.filter().memory());
+    return bytes_of(filter.newest().memory());
   }();
   return bytes;
 }
@@ -74,7 +74,7 @@ RC_GTEST_PROP(ReplayFilter, OrderOfArrivalDoesNotMatterWithinTheBuffer, (std::ui
   std::stable_sort(arrivals.begin(), arrivals.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   ReplayFilter filter = started_filter(test_options());
   for (const auto& [time, m] : arrivals) RC_ASSERT(!filter.add(m).has_value());
-  RC_ASSERT(bytes_of(filter.filter().memory()) == in_order_result());
+  RC_ASSERT(bytes_of(filter.newest().memory()) == in_order_result());
 }
 
 RC_GTEST_PROP(ReplayFilter, ContinuesBitForBitFromASavedMemory, (std::uint32_t seed)) {
@@ -116,9 +116,9 @@ TEST(ReplayFilter, AppliesAConstraintThatIsOlderThanTheBuffer) {
   for (const Measurement& m : after_start()) {
     if (stamp_of_measurement(m) < test_stamp(7)) filter.add(m);
   }
-  const Stamp frame = filter.filter().memory().vision.clone_stamp;
+  const Stamp frame = filter.newest().memory().vision.clone_stamp;
   ASSERT_GT(seconds_between(frame, test_stamp(6.9)), o.buffer_s);
-  const Pose seen = filter.filter().memory().estimate.state.world_from_vision_clone;
+  const Pose seen = filter.newest().memory().estimate.state.world_from_vision_clone;
   ASSERT_FALSE(filter.add(PoseConstraint{frame, seen, 1e6 * Matrix6d::Identity()}));
   const Bytes bytes = saved(filter);
   ReplayFilter other(o);
@@ -128,7 +128,7 @@ TEST(ReplayFilter, AppliesAConstraintThatIsOlderThanTheBuffer) {
   // Both replay it after a sample that arrives even later.
   for (ReplayFilter* each : {&filter, &other}) each->add(CompassSample{test_stamp(6.501), 0.01, 0.02});
   EXPECT_EQ(saved(other), saved(filter));
-  EXPECT_EQ(other.filter().memory().monitor(LocalizationSensor::map).used, 2) << "the one of the drive and this one";
+  EXPECT_EQ(other.newest().memory().monitor(LocalizationSensor::map).used, 2) << "the one of the drive and this one";
 }
 
 TEST(ReplayFilter, DiscardsOldEntries) {
@@ -143,7 +143,7 @@ TEST(ReplayFilter, DiscardsOldEntries) {
   ReplayFilter all = started_filter(test_options());
   for (const Measurement& m : after_start()) all.add(m);
   EXPECT_LT(2 * (largest - bytes_of(FilterMemory{}).size()), saved(all).size() - bytes_of(FilterMemory{}).size());
-  EXPECT_EQ(bytes_of(filter.filter().memory()), bytes_of(all.filter().memory()));
+  EXPECT_EQ(bytes_of(filter.newest().memory()), bytes_of(all.newest().memory()));
 }
 
 TEST(ReplayFilter, RefusesADamagedMemory) {

@@ -19,7 +19,7 @@ constexpr double kFreshWheels_s = 0.5, kFreshFrame_s = 3;
 }  // namespace
 
 void ErrorStateFilter::update(const WheelSample& sample) {
-  propagate_to(sample.stamp, nullptr);
+  advance_to(sample.stamp);
   WheelMemory& wheels = memory_.wheels;
   const ZeroVelocityOptions& zero_velocity = options_.zero_velocity;
   if (!wheels.known || std::abs(sample.left_m - wheels.moved.left_m) > zero_velocity.wheels_stationary_m ||

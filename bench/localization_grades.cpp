@@ -1,0 +1,217 @@
+// Inertial sensors of several grades, mounted off the body's origin, with a clock of their own, under vibration and
+// without a rest: `make bench-localization_grades ARGS="..."`.
+//
+//   localization_grades [--config FOLDER] [--from RECORDINGS] [--runs RUNS] [--errors NAME,NAME] [--seeds N]
+//                       [--first SEED] [--grades tactical,industrial,mems] [--delay-ms D] [SCENARIO...]
+//
+// The true motion and the samples of the sensors are those of the simulator; nothing is rendered. The errors of the
+// odometry are those of rendered drives (RECORDINGS/NAME with the run RUNS/NAME), scaled to the covariance that
+// RUNS/SCENARIO reported. Trials are paired: all subsets of sensors use the same samples and the same odometry.
+#include <fmt/format.h>
+
+#include <sstream>
+#include <stdexcept>
+
+#include "localization_trial.h"
+#include "odometry_errors.h"
+#include "standard_recordings.h"
+#include "trial_statistics.h"
+
+namespace spartan {
+namespace {
+
+/// Of the IMU on the body: 0.3 m from its origin.
+const std::vector<double> kPosition_m = {0.2, -0.1, 0.2};
+
+std::vector<std::string> split(const std::string& list) {
+  std::vector<std::string> names;
+  std::stringstream in(list);
+  for (std::string name; std::getline(in, name, ',');) names.push_back(name);
+  return names;
+}
+
+/// Typical covariance of the motions of a run, body frame.
+struct ReportedMotion {
+  Matrix6d covariance, root;
+};
+ReportedMotion reported_motion(const std::string& recording, const std::string& run) {
+  const auto source = open_recording(recording);
+  const auto motions = motions_of_run(run);
+  if (!source || !motions || motions->empty()) throw std::runtime_error(run + ": is no run of " + recording);
+  const Rig& rig = (*source)->info().rig;
+  const auto pair = std::find_if(rig.pairs.begin(), rig.pairs.end(), [](const auto& p) { return p.for_odometry; });
+  const Matrix6d ad = adjoint(rig.body_from_camera(pair->left)), camera = typical_covariance(*motions);
+  return {ad * camera * ad.transpose(), ad * Matrix6d(camera.llt().matrixL())};
+}
+
+std::vector<RelativeMotion> vision(const TrueDrive& drive, const ReportedMotion& reported, const OdometryErrors& errors,
+                                   std::uint64_t seed) {
+  const WhitenedErrors whitened = errors.draw(drive.poses.size(), seed);
+  std::vector<RelativeMotion> motions;
+  for (std::size_t i = 1; i < drive.poses.size(); ++i) {
+    RelativeMotion m;
+    m.from = sim::internal::stamp_at(drive.frames_s[i - 1]);
+    m.to = sim::internal::stamp_at(drive.frames_s[i]);
+    m.previous_from_current = drive.poses[i - 1].inverse() * drive.poses[i] * exp_se3(reported.root * whitened[i]);
+    m.covariance = reported.covariance;
+    motions.push_back(m);
+  }
+  return motions;
+}
+
+/// Leaves out the frames up to the first one in motion.
+void without_rest(TrueDrive& drive) {
+  double fastest = 0;
+  for (const double t : drive.frames_s) fastest = std::max(fastest, drive.motion->velocity(t).norm());
+  std::size_t first = 0;
+  while (drive.motion->velocity(drive.frames_s[first]).norm() < 0.5 * fastest) ++first;
+  drive.frames_s.erase(drive.frames_s.begin(), drive.frames_s.begin() + static_cast<std::ptrdiff_t>(first));
+  drive.poses.erase(drive.poses.begin(), drive.poses.begin() + static_cast<std::ptrdiff_t>(first));
+}
+
+struct Setup {
+  const TrueDrive& drive;
+  const ReportedMotion& reported;
+  const OdometryErrors& errors;
+  LocalizationOptions options;
+  int first_seed = 1, seeds = 50;
+};
+
+std::vector<TrialResult> trials_of(const Setup& setup, const Subset& subset, const ThreadPool& workers) {
+  std::vector<TrialResult> results(static_cast<std::size_t>(setup.seeds));
+  workers.parallel_for(0, setup.seeds, 1, [&](int from, int to) {
+    for (int i = from; i < to; ++i) {
+      const auto seed = static_cast<std::uint64_t>(setup.first_seed + i);
+      DrawnDrive d = draw(setup.drive, {}, setup.drive.scenario.compass, seed);
+      d.motions = vision(setup.drive, setup.reported, setup.errors, seed);
+      std::vector<Arrival> all = arrivals(d, subset);
+      const Stamp start = sim::internal::stamp_at(setup.drive.frames_s.front());
+      std::erase_if(all, [&](const Arrival& a) { return a.at_ns < start.ns; });
+      results[static_cast<std::size_t>(i)] = run_trial(setup.drive, all, setup.options);
+    }
+  });
+  return results;
+}
+
+double largest(const std::vector<TrialResult>& trials, const auto& value) {
+  double most = 0;
+  for (const TrialResult& t : trials) most = std::max(most, value(t));
+  return most;
+}
+
+void print_grade(const std::string& name, const Setup& setup, const ThreadPool& workers) {
+  const TrueDrive& drive = setup.drive;
+  const Band three = band(3, setup.seeds);
+  fmt::print(
+      "\n### {} IMU\n\n| sensors | final error, % | minus vision alone | ATE, mm | minus vision alone | NEES position, "
+      "attitude | IMU aligned after, s, m | not aligned | IMU not ok, frames | clock, ms | its sigma, ms |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n",
+      name);
+  std::vector<TrialResult> alone;
+  int worse = 0;
+  for (int mask = 0; mask < 16; ++mask) {
+    const Subset subset = Subset::of(mask);
+    const auto trials = trials_of(setup, subset, workers);
+    if (mask == 0) alone = trials;
+    std::vector<double> end, end_more, ate, ate_more, position, attitude, clock, clock_sigma;
+    double not_aligned = 0;
+    for (std::size_t i = 0; i < trials.size(); ++i) {
+      const TrialResult& t = trials[i];
+      end.push_back(t.final_percent);
+      end_more.push_back(t.final_percent - alone[i].final_percent);
+      ate.push_back(1e3 * t.ate_m);
+      ate_more.push_back(1e3 * (t.ate_m - alone[i].ate_m));
+      position.push_back(t.frames.back().nees_position);
+      attitude.push_back(t.frames.back().nees_attitude);
+      clock.push_back(1e3 * t.last.imu_time_offset_s);
+      clock_sigma.push_back(1e3 * t.last.imu_time_offset_sigma_s);
+      not_aligned += t.imu_aligned_at ? 0 : 1;
+    }
+    const auto travelled = [&](const TrialResult& t) {
+      double sum = 0;
+      for (std::size_t i = 1; i <= t.imu_aligned_at.value_or(0); ++i)
+        sum += (drive.poses[i].translation() - drive.poses[i - 1].translation()).norm();
+      return sum;
+    };
+    const auto seconds = [&](const TrialResult& t) {
+      return drive.frames_s[t.imu_aligned_at.value_or(0)] - drive.frames_s[0];
+    };
+    const auto not_ok = [&](const TrialResult& t) {
+      const auto& states = t.states_s[static_cast<std::size_t>(LocalizationSensor::imu)];
+      return static_cast<double>(t.frames.size()) - states[static_cast<std::size_t>(SensorState::ok)];
+    };
+    const Mean e = mean_of(end_more), a = mean_of(ate_more);
+    const bool is_worse = e.mean - e.half_width > 0 || a.mean - a.half_width > 0;
+    worse += is_worse ? 1 : 0;
+    const double of_position = mean_of(position).mean, of_attitude = mean_of(attitude).mean;
+    fmt::print("| {}{} | {:.4f} | {:+.4f} ± {:.4f} | {:.2f} | {:+.2f} ± {:.2f} | {:.2f}{}, {:.2f}{} |", subset.name(),
+               is_worse ? " (worse)" : "", mean_of(end).mean, e.mean, e.half_width, mean_of(ate).mean, a.mean,
+               a.half_width, of_position, three.contains(of_position) ? "" : "*", of_attitude,
+               three.contains(of_attitude) ? "" : "*");
+    if (subset.imu)
+      fmt::print(" {:.1f}, {:.2f} | {:.0f} | {:.1f} | {:.1f} ± {:.1f} | {:.2f} |", largest(trials, seconds),
+                 largest(trials, travelled), not_aligned, largest(trials, not_ok), mean_of(clock).mean,
+                 mean_of(clock).half_width, mean_of(clock_sigma).mean);
+    fmt::print("\n");
+    std::fflush(stdout);
+  }
+  fmt::print("\nworse than vision alone (95 %): {} of 15\n", worse);
+}
+
+void print_scenario(const std::string& name, const RecordingArguments& arguments, const OdometryErrors& errors) {
+  const ReportedMotion reported = reported_motion(fmt::format("{}/{}", arguments.folder, name),
+                                                  fmt::format("{}/{}", arguments.options.at("--runs"), name));
+  const ThreadPool workers(2);
+  for (const std::string& grade : split(arguments.options.at("--grades"))) {
+    auto drive = open_true_drive(arguments.options.at("--config"), name);
+    if (!drive)
+      throw std::runtime_error(fmt::format("{}: no such scenario in {}", name, arguments.options.at("--config")));
+    without_rest(*drive);
+    const auto kind = value_named<sim::ImuGrade>(grade);
+    if (!kind) throw std::runtime_error(grade + ": is no grade");
+    drive->scenario.imu = sim::imu_of_grade(*kind);
+    drive->scenario.imu.position_m = kPosition_m;
+    drive->scenario.imu.delay_ms = arguments.number("--delay-ms");
+    Setup setup{
+        *drive, reported, errors, options_for(*drive), arguments.number("--first"), arguments.number("--seeds")};
+    setup.options.imu.position_m = Eigen::Map<const Eigen::Vector3d>(kPosition_m.data());
+    if (grade == split(arguments.options.at("--grades")).front()) {
+      const Band three = band(3, setup.seeds);
+      fmt::print("\n## {}: {:.0f} m, {} frames, {} seeds, stamps of the IMU {} ms late\n\n", name, drive->length_m,
+                 drive->poses.size(), setup.seeds, arguments.number("--delay-ms"));
+      fmt::print(
+          "NEES at the end, 95 % band: {:.2f} to {:.2f}; * outside. Aligned, not ok: the largest of all seeds.\n",
+          three.low, three.high);
+    }
+    print_grade(grade, setup, workers);
+  }
+}
+
+void run(const std::vector<std::string>& words) {
+  RecordingArguments arguments = read_arguments(words, {{"--config", "config"},
+                                                        {"--runs", "runs"},
+                                                        {"--errors", ""},
+                                                        {"--seeds", "50"},
+                                                        {"--first", "1"},
+                                                        {"--grades", "tactical,industrial,mems"},
+                                                        {"--delay-ms", "20"}});
+  if (arguments.scenarios.empty()) arguments.scenarios = {"rocky_20pct"};
+  std::vector<WhitenedErrors> drives;
+  for (const std::string& name : split(arguments.options.at("--errors"))) {
+    auto errors = whitened_errors(fmt::format("{}/{}", arguments.folder, name),
+                                  fmt::format("{}/{}", arguments.options.at("--runs"), name));
+    if (!errors || errors->empty())
+      throw std::runtime_error(name + ": there is no recording with ground truth, or no run");
+    drives.push_back(std::move(*errors));
+  }
+  if (drives.empty()) throw std::runtime_error("--errors: names no rendered drives");
+  const OdometryErrors errors(std::move(drives));
+  for (const std::string& name : arguments.scenarios) print_scenario(name, arguments, errors);
+}
+
+}  // namespace
+}  // namespace spartan
+
+int main(int argc, char** argv) {
+  return spartan::run_benchmark(argc, argv, spartan::run);
+}
