@@ -9,11 +9,10 @@
 // RUNS/SCENARIO reported. Trials are paired: all subsets of sensors use the same samples and the same odometry.
 #include <fmt/format.h>
 
-#include <sstream>
 #include <stdexcept>
 
 #include "localization_trial.h"
-#include "odometry_errors.h"
+#include "resampled_odometry.h"
 #include "standard_recordings.h"
 #include "trial_statistics.h"
 
@@ -22,42 +21,6 @@ namespace {
 
 /// Of the IMU on the body: 0.3 m from its origin.
 const std::vector<double> kPosition_m = {0.2, -0.1, 0.2};
-
-std::vector<std::string> split(const std::string& list) {
-  std::vector<std::string> names;
-  std::stringstream in(list);
-  for (std::string name; std::getline(in, name, ',');) names.push_back(name);
-  return names;
-}
-
-/// Typical covariance of the motions of a run, body frame.
-struct ReportedMotion {
-  Matrix6d covariance, root;
-};
-ReportedMotion reported_motion(const std::string& recording, const std::string& run) {
-  const auto source = open_recording(recording);
-  const auto motions = motions_of_run(run);
-  if (!source || !motions || motions->empty()) throw std::runtime_error(run + ": is no run of " + recording);
-  const Rig& rig = (*source)->info().rig;
-  const auto pair = std::find_if(rig.pairs.begin(), rig.pairs.end(), [](const auto& p) { return p.for_odometry; });
-  const Matrix6d ad = adjoint(rig.body_from_camera(pair->left)), camera = typical_covariance(*motions);
-  return {ad * camera * ad.transpose(), ad * Matrix6d(camera.llt().matrixL())};
-}
-
-std::vector<RelativeMotion> vision(const TrueDrive& drive, const ReportedMotion& reported, const OdometryErrors& errors,
-                                   std::uint64_t seed) {
-  const WhitenedErrors whitened = errors.draw(drive.poses.size(), seed);
-  std::vector<RelativeMotion> motions;
-  for (std::size_t i = 1; i < drive.poses.size(); ++i) {
-    RelativeMotion m;
-    m.from = sim::internal::stamp_at(drive.frames_s[i - 1]);
-    m.to = sim::internal::stamp_at(drive.frames_s[i]);
-    m.previous_from_current = drive.poses[i - 1].inverse() * drive.poses[i] * exp_se3(reported.root * whitened[i]);
-    m.covariance = reported.covariance;
-    motions.push_back(m);
-  }
-  return motions;
-}
 
 /// Leaves out the frames up to the first one in motion.
 void without_rest(TrueDrive& drive) {
@@ -71,8 +34,6 @@ void without_rest(TrueDrive& drive) {
 
 struct Setup {
   const TrueDrive& drive;
-  const ReportedMotion& reported;
-  const OdometryErrors& errors;
   LocalizationOptions options;
   int first_seed = 1, seeds = 50;
 };
@@ -82,8 +43,7 @@ std::vector<TrialResult> trials_of(const Setup& setup, const Subset& subset, con
   workers.parallel_for(0, setup.seeds, 1, [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       const auto seed = static_cast<std::uint64_t>(setup.first_seed + i);
-      DrawnDrive d = draw(setup.drive, {}, setup.drive.scenario.compass, seed);
-      d.motions = vision(setup.drive, setup.reported, setup.errors, seed);
+      const DrawnDrive d = draw(setup.drive, {}, setup.drive.scenario.compass, seed);
       std::vector<Arrival> all = arrivals(d, subset);
       const Stamp start = sim::internal::stamp_at(setup.drive.frames_s.front());
       std::erase_if(all, [&](const Arrival& a) { return a.at_ns < start.ns; });
@@ -158,22 +118,21 @@ void print_grade(const std::string& name, const Setup& setup, const ThreadPool& 
   fmt::print("\nworse than vision alone (95 %): {} of 15\n", worse);
 }
 
-void print_scenario(const std::string& name, const RecordingArguments& arguments, const OdometryErrors& errors) {
-  const ReportedMotion reported = reported_motion(fmt::format("{}/{}", arguments.folder, name),
-                                                  fmt::format("{}/{}", arguments.options.at("--runs"), name));
+void print_scenario(const std::string& name, const RecordingArguments& arguments) {
+  const auto odometry = resampled_odometry(arguments, name);
   const ThreadPool workers(2);
   for (const std::string& grade : split(arguments.options.at("--grades"))) {
     auto drive = open_true_drive(arguments.options.at("--config"), name);
     if (!drive)
       throw std::runtime_error(fmt::format("{}: no such scenario in {}", name, arguments.options.at("--config")));
+    drive->odometry = odometry;
     without_rest(*drive);
     const auto kind = value_named<sim::ImuGrade>(grade);
     if (!kind) throw std::runtime_error(grade + ": is no grade");
     drive->scenario.imu = sim::imu_of_grade(*kind);
     drive->scenario.imu.position_m = kPosition_m;
     drive->scenario.imu.delay_ms = arguments.number("--delay-ms");
-    Setup setup{
-        *drive, reported, errors, options_for(*drive), arguments.number("--first"), arguments.number("--seeds")};
+    Setup setup{*drive, options_for(*drive), arguments.number("--first"), arguments.number("--seeds")};
     setup.options.imu.position_m = Eigen::Map<const Eigen::Vector3d>(kPosition_m.data());
     if (grade == split(arguments.options.at("--grades")).front()) {
       const Band three = band(3, setup.seeds);
@@ -196,17 +155,7 @@ void run(const std::vector<std::string>& words) {
                                                         {"--grades", "tactical,industrial,mems"},
                                                         {"--delay-ms", "20"}});
   if (arguments.scenarios.empty()) arguments.scenarios = {"rocky_20pct"};
-  std::vector<WhitenedErrors> drives;
-  for (const std::string& name : split(arguments.options.at("--errors"))) {
-    auto errors = whitened_errors(fmt::format("{}/{}", arguments.folder, name),
-                                  fmt::format("{}/{}", arguments.options.at("--runs"), name));
-    if (!errors || errors->empty())
-      throw std::runtime_error(name + ": there is no recording with ground truth, or no run");
-    drives.push_back(std::move(*errors));
-  }
-  if (drives.empty()) throw std::runtime_error("--errors: names no rendered drives");
-  const OdometryErrors errors(std::move(drives));
-  for (const std::string& name : arguments.scenarios) print_scenario(name, arguments, errors);
+  for (const std::string& name : arguments.scenarios) print_scenario(name, arguments);
 }
 
 }  // namespace

@@ -1,10 +1,11 @@
 // Monte Carlo test of the localization: `make bench-localization_monte_carlo`.
 //
 //   localization_monte_carlo [--seeds N] [--first SEED] [--threads N] [--tables subsets|faults|wild] [--config FOLDER]
-//   [SCENARIO...]
+//                            [--from RECORDINGS] [--runs RUNS] [--errors NAME,NAME] [SCENARIO...]
 //
 // The true motion comes from the simulator; for each seed the sensor errors are drawn anew, and the odometry errors
-// from the model measured on rendered drives (MeasuredOdometryError). Nothing is rendered. Trials are paired: all
+// from a model (MeasuredOdometryError) or, with --errors, from those of rendered drives (resampled_odometry.h). Nothing
+// is rendered. Trials are paired: all
 // subsets of sensors use the same drive, the same samples and the same odometry. Default: rocky_20pct, crater_rim,
 // loop.
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include <stdexcept>
 
 #include "localization_trial.h"
+#include "resampled_odometry.h"
 #include "standard_recordings.h"
 #include "trial_statistics.h"
 
@@ -35,12 +37,14 @@ struct Seeds {
 };
 
 std::vector<TrialResult> run_trials(const TrueDrive& drive, const Subset& subset, const Seeds& seeds,
-                                    const MeasurementSource& arrivals_of, const ThreadPool& workers) {
+                                    const MeasurementSource& arrivals_of, const ThreadPool& workers,
+                                    const std::optional<Watch>& watch = {}) {
   std::vector<TrialResult> results(static_cast<std::size_t>(seeds.count));
   workers.parallel_for(0, seeds.count, 1, [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       const auto seed = static_cast<std::uint64_t>(seeds.first + i);
-      results[static_cast<std::size_t>(i)] = run_trial(drive, arrivals_of(drive, seed, subset), options_for(drive));
+      results[static_cast<std::size_t>(i)] =
+          run_trial(drive, arrivals_of(drive, seed, subset), options_for(drive), watch);
     }
   });
   return results;
@@ -182,8 +186,49 @@ std::vector<Arrival> with_reordered_stamps(const TrueDrive& drive, std::uint64_t
   return all;
 }
 
+/// Applies a change to each sample of one kind in [from_s, to_s).
+template <class Sample, class Change>
+MeasurementSource changed(double from_s, double to_s, const Change& change) {
+  return [=](const TrueDrive& drive, std::uint64_t seed, const Subset& subset) {
+    auto all = nominal(drive, seed, subset);
+    Random random(seed, 404);
+    for (Arrival& a : all) {
+      auto* sample = std::get_if<Sample>(&a.measurement);
+      const double t = seconds_between(sim::internal::stamp_at(0), Stamp{a.at_ns});
+      if (sample != nullptr && t >= from_s && t < to_s) change(*sample, t - from_s, random);
+    }
+    return all;
+  };
+}
+
+// Stamps of all samples but vision scatter by 20 ms; they arrive in their order.
+std::vector<Arrival> with_jitter(const TrueDrive& drive, std::uint64_t seed, const Subset& subset, double from_s,
+                                 double to_s) {
+  auto all = nominal(drive, seed, subset);
+  Random random(seed, 405);
+  for (Arrival& a : all) {
+    const double t = seconds_between(sim::internal::stamp_at(0), Stamp{a.at_ns});
+    if (t < from_s || t >= to_s) continue;
+    const auto shift = static_cast<std::int64_t>(1e9 * random.uniform(-0.02, 0.02));
+    std::visit(
+        [&](auto& m) {
+          if constexpr (requires { m.stamp; }) m.stamp.ns += shift;
+        },
+        a.measurement);
+  }
+  return all;
+}
+
+// The middle between two frames of a moving rover, after 40 % of the drive.
+double while_moving(const TrueDrive& drive) {
+  constexpr double kLongestMoving_s = 2;
+  std::size_t frame = drive.frames_s.size() * 2 / 5;
+  while (drive.frames_s[frame + 1] - drive.frames_s[frame] > kLongestMoving_s) ++frame;
+  return 0.5 * (drive.frames_s[frame] + drive.frames_s[frame + 1]);
+}
+
 std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
-  const double from = 0.4 * drive.motion->seconds();
+  const double end = drive.motion->seconds(), at_stop = 0.4 * end, from = while_moving(drive);
   const auto drawn = [](const sim::SensorFaults& faults, double outliers) -> MeasurementSource {
     return [=](const TrueDrive& d, std::uint64_t seed, const Subset& subset) {
       sim::CompassOptions compass = d.scenario.compass;
@@ -191,18 +236,46 @@ std::vector<FaultCase> fault_cases(const TrueDrive& drive) {
       return arrivals(draw(d, faults, compass, seed), subset);
     };
   };
+  const auto dark = [=](double seconds) -> MeasurementSource {
+    return [=](const TrueDrive& d, std::uint64_t s, const Subset& w) {
+      return without_vision(d, s, w, from, from + seconds);
+    };
+  };
+  const auto stamped = [=](std::int64_t ns) {
+    return changed<ImuSample>(from, from + 40, [=](ImuSample& m, double, Random& random) {
+      if (random.uniform() < 0.02) m.stamp.ns += ns;
+    });
+  };
+  const auto accel_step = [](ImuSample& m, double, Random&) { m.accel_m_s2.array() += 0.3; };
+  constexpr double kBurst_rad = 40 / 57.29578;
   using enum LocalizationSensor;
   return {
-      {"camera dark 10 s", vision, from, from + 10,
-       [=](const TrueDrive& d, std::uint64_t s, const Subset& w) { return without_vision(d, s, w, from, from + 10); }},
-      {"compass outliers 30 %", compass, 0, drive.motion->seconds(), drawn({}, 0.3)},
+      {"camera dark 10 s", vision, from, from + 10, dark(10)},
+      {"camera dark 30 s", vision, from, from + 30, dark(30)},
+      {"gyro bias steps by 0.02 rad/s", imu, from, end,
+       changed<ImuSample>(from, end, [](ImuSample& m, double, Random&) { m.gyro_rad_s.array() += 0.02; })},
+      {"accelerometer bias steps by 0.3 m/s²", imu, from, end, changed<ImuSample>(from, end, accel_step)},
+      {"the same at a stop", imu, at_stop, end, changed<ImuSample>(at_stop, end, accel_step)},
+      {"compass outliers 30 %", compass, 0, end, drawn({}, 0.3)},
+      {"compass 40° off, 10 s of every 20 s, for 80 s", compass, from, from + 80,
+       changed<CompassSample>(
+           from, from + 80,
+           [](CompassSample& m, double t, Random&) { m.heading_rad += std::fmod(t, 20) < 10 ? kBurst_rad : 0; })},
+      {"compass stuck", compass, from, end,
+       drawn({{sim::MotionSensor::compass, sim::SensorFaultKind::freeze, from, end}}, 0)},
       {"wheel slip 80 % for 40 s", wheels, from, from + 40,
        [=](const TrueDrive& d, std::uint64_t s, const Subset& w) { return slipping(d, s, w, from, from + 40); }},
+      {"stamps scatter by 20 ms for 40 s", imu, from, from + 40,
+       [=](const TrueDrive& d, std::uint64_t s, const Subset& w) { return with_jitter(d, s, w, from, from + 40); }},
+      {"IMU gap 1 s", imu, from, from + 1,
+       drawn({{sim::MotionSensor::imu, sim::SensorFaultKind::drop, from, from + 1}}, 0)},
       {"IMU gap 10 s", imu, from, from + 10,
        drawn({{sim::MotionSensor::imu, sim::SensorFaultKind::drop, from, from + 10}}, 0)},
       {"IMU frozen 10 s", imu, from, from + 10,
        drawn({{sim::MotionSensor::imu, sim::SensorFaultKind::freeze, from, from + 10}}, 0)},
-      {"NaN in 5 % of all samples", imu, 0, drive.motion->seconds(), with_nans},
+      {"NaN in 5 % of all samples", imu, 0, end, with_nans},
+      {"2 % of the IMU's stamps 20 s back", imu, from, from + 40, stamped(-20'000'000'000)},
+      {"2 % of the IMU's stamps 1000 s ahead", imu, from, from + 40, stamped(1'000'000'000'000)},
       {"stamps out of order for 40 s", imu, from, from + 40,
        [=](const TrueDrive& d, std::uint64_t s, const Subset& w) {
          return with_reordered_stamps(d, s, w, from, from + 40);
@@ -256,19 +329,39 @@ void print_wild_motions(const TrueDrive& drive, const Seeds& seeds, const Thread
   }
 }
 
+// Median and largest delay of the detection, and in how many trials there was none.
+std::string detection_text(const std::vector<TrialResult>& trials) {
+  std::vector<double> seconds, samples;
+  for (const TrialResult& t : trials) {
+    if (!t.detection) continue;
+    seconds.push_back(t.detection->after_s);
+    samples.push_back(t.detection->samples);
+  }
+  if (seconds.empty()) return "never";
+  std::sort(seconds.begin(), seconds.end());
+  std::sort(samples.begin(), samples.end());
+  const std::size_t middle = seconds.size() / 2;
+  std::string text = fmt::format("{:.2f}, {:.2f} s ({:.0f}, {:.0f})", seconds[middle], seconds.back(), samples[middle],
+                                 samples.back());
+  if (seconds.size() < trials.size()) text += fmt::format("; not in {}", trials.size() - seconds.size());
+  return text;
+}
+
 void print_faults(const TrueDrive& drive, const Seeds& seeds, const ThreadPool& workers) {
   fmt::print("\n## {}: sensor faults, all sensors ({} seeds)\n\n", drive.scenario.name, seeds.count);
   fmt::print(
       "\"Inside 3 σ\": trials whose position error is inside the 99.7 % region of its covariance, 5 frames after the "
-      "fault and at the end.\n\n");
+      "fault and at the end. Detected: median and largest time in seconds (and samples of the sensor) after which its "
+      "health says so.\n\n");
   fmt::print(
       "| fault | final error, % | vision alone, same fault | largest error, mm | inside 3 σ after the fault | at the "
       "end | "
       "NEES pose "
-      "at the end | excluded / missing, frames per trial | state at the end "
-      "|\n|---|---|---|---|---|---|---|---|---|\n");
+      "at the end | detected | excluded / missing, frames per trial | state at the end "
+      "|\n|---|---|---|---|---|---|---|---|---|---|\n");
   for (const FaultCase& fault : fault_cases(drive)) {
-    const auto trials = run_trials(drive, Subset::of(15), seeds, fault.measurements, workers);
+    const auto trials =
+        run_trials(drive, Subset::of(15), seeds, fault.measurements, workers, Watch{fault.sensor, fault.from_s});
     const auto alone = run_trials(drive, Subset::of(0), seeds, fault.measurements, workers);
     int inside_after = 0, inside_end = 0, ok = 0;
     double largest = 0, excluded = 0, missing = 0;
@@ -286,30 +379,38 @@ void print_faults(const TrueDrive& drive, const Seeds& seeds, const ThreadPool& 
     }
     const auto end = [](const TrialResult& t) { return t.final_percent; };
     const double n = static_cast<double>(trials.size());
-    fmt::print("| {} | {:.4f} | {:.4f} | {:.0f} | {} of {} | {} of {} | {:.2f} | {:.1f} / {:.1f} | {} of {} ok |\n",
-               fault.name, mean_of(each(trials, end)).mean, mean_of(each(alone, end)).mean, 1e3 * largest, inside_after,
-               seeds.count, inside_end, seeds.count,
-               mean_of(each(trials, [](const TrialResult& t) { return t.frames.back().nees_pose; })).mean, excluded / n,
-               missing / n, ok, seeds.count);
+    fmt::print(
+        "| {} | {:.4f} | {:.4f} | {:.0f} | {} of {} | {} of {} | {:.2f} | {} | {:.1f} / {:.1f} | {} of {} ok |\n",
+        fault.name, mean_of(each(trials, end)).mean, mean_of(each(alone, end)).mean, 1e3 * largest, inside_after,
+        seeds.count, inside_end, seeds.count,
+        mean_of(each(trials, [](const TrialResult& t) { return t.frames.back().nees_pose; })).mean,
+        detection_text(trials), excluded / n, missing / n, ok, seeds.count);
     std::fflush(stdout);
   }
 }
 
 void run(const std::vector<std::string>& words) {
-  RecordingArguments arguments = read_arguments(
-      words, {{"--seeds", "30"}, {"--first", "1"}, {"--threads", "2"}, {"--config", "config"}, {"--tables", "all"}});
+  RecordingArguments arguments = read_arguments(words, {{"--seeds", "30"},
+                                                        {"--first", "1"},
+                                                        {"--threads", "2"},
+                                                        {"--config", "config"},
+                                                        {"--tables", "all"},
+                                                        {"--runs", "runs"},
+                                                        {"--errors", ""}});
   if (arguments.scenarios.empty()) arguments.scenarios = {"rocky_20pct", "crater_rim", "loop"};
   const ThreadPool workers(arguments.number("--threads"));
   const Seeds seeds{arguments.number("--first"), arguments.number("--seeds")};
   fmt::print(
-      "# Localization, Monte Carlo\n\nOdometry errors drawn from their measured model. Final error: of the last "
+      "# Localization, Monte Carlo\n\nOdometry errors: {}. Final error: of the last "
       "position, "
       "over the distance travelled; ATE: RMS position error over the frames; both relative to the first pose. ±: 95 % "
-      "confidence interval of the paired difference.\n");
+      "confidence interval of the paired difference.\n",
+      arguments.options.at("--errors").empty() ? "a model" : "those of " + arguments.options.at("--errors"));
   for (const std::string& name : arguments.scenarios) {
-    const auto drive = open_true_drive(arguments.options.at("--config"), name);
+    auto drive = open_true_drive(arguments.options.at("--config"), name);
     if (!drive)
       throw std::runtime_error(fmt::format("{}: no such scenario in {}", name, arguments.options.at("--config")));
+    if (!arguments.options.at("--errors").empty()) drive->odometry = resampled_odometry(arguments, name);
     const std::string& tables = arguments.options.at("--tables");
     if (tables == "all" || tables == "subsets") print_subsets(*drive, seeds, workers);
     if (tables == "all" || tables == "faults") print_faults(*drive, seeds, workers);

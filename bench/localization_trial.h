@@ -45,6 +45,8 @@ struct TrueDrive {
   std::vector<double> frames_s;
   std::vector<Pose> poses;  ///< at the frames
   double length_m = 0;      ///< of the polyline through the poses
+  /// Visual motions with the errors of a seed; unset: MeasuredOdometryError.
+  std::function<std::vector<RelativeMotion>(const TrueDrive&, std::uint64_t seed)> odometry;
 };
 
 inline std::optional<TrueDrive> open_true_drive(const std::string& folder, const std::string& name) {
@@ -132,7 +134,7 @@ inline DrawnDrive draw(const TrueDrive& drive, const sim::SensorFaults& faults, 
   d.wheels = sim::internal::measure_wheels(*drive.motion, s.chassis, s.wheels, faults, seed);
   d.compass = sim::internal::measure_compass(*drive.motion, compass, faults, seed);
   d.inclinometer = sim::internal::measure_inclinometer(*drive.motion, s.inclinometer, faults, seed);
-  d.motions = MeasuredOdometryError().draw(drive, seed);
+  d.motions = drive.odometry ? drive.odometry(drive, seed) : MeasuredOdometryError().draw(drive, seed);
   return d;
 }
 
@@ -163,10 +165,20 @@ struct FrameError {
   double time_s = 0, distance_m = 0;  ///< distance_m: position error
   double nees_position = 0, nees_attitude = 0, nees_pose = 0;
 };
+/// When a fault of a sensor was first reported: its state is not ok, or one of its samples was refused.
+struct Detection {
+  double after_s = 0;
+  int samples = 0;  ///< of the sensor, since the fault began
+};
+struct Watch {
+  LocalizationSensor sensor = LocalizationSensor::vision;
+  double from_s = 0;
+};
 struct TrialResult {
   std::vector<FrameError> frames;
   double ate_m = 0, final_percent = 0;
   LocalizationEstimate last;
+  std::optional<Detection> detection;
   std::optional<std::size_t> imu_aligned_at;  ///< first frame at which the readings of the IMU were used
   std::array<std::array<double, 4>, kLocalizationSensors> states_s{};  ///< frames in each state, by sensor
 };
@@ -179,20 +191,34 @@ inline LocalizationOptions options_for(const TrueDrive& drive) {
   return with_specified_noise(options, sim::internal::specified_noise(s.imu, s.compass, s.inclinometer));
 }
 
+inline void watch_for(const Watch& watch, const Localizer& localizer, const Arrival& arrival, int& samples,
+                      TrialResult& result) {
+  constexpr double kLongest_s = 60;
+  const double after = seconds_between(sim::internal::stamp_at(watch.from_s), Stamp{arrival.at_ns});
+  if (result.detection || after < 0 || after > kLongest_s) return;
+  samples += sensor_of(arrival.measurement) == watch.sensor ? 1 : 0;
+  const SensorHealth health = localizer.estimate().health_of(watch.sensor);
+  const RefusalCounts& r = health.refused;
+  if (health.state != SensorState::ok || r.not_finite + r.too_late + r.too_early + r.duplicates + r.reversed > 0)
+    result.detection = Detection{after, samples};
+}
+
 inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>& all,
-                             const LocalizationOptions& options) {
+                             const LocalizationOptions& options, const std::optional<Watch>& watch = {}) {
   Localizer localizer = Localizer::create(options).value();
   TrialResult result;
   Pose first;  // of the localization, relative to which errors are measured
   const std::int64_t start_ns = sim::internal::stamp_at(drive.frames_s.front()).ns;
   std::size_t frame = 0;
   double squares = 0;
+  int samples_since = 0;
   for (const Arrival& arrival : all) {
     if (!localizer.started() && arrival.at_ns > start_ns) {
       localizer.start({start_ns}, Eigen::Vector3d::UnitX());
       first = localizer.estimate().world_from_body.pose;
     }
     localizer.add(arrival.measurement);
+    if (watch && localizer.started()) watch_for(*watch, localizer, arrival, samples_since, result);
     const auto* motion = std::get_if<RelativeMotion>(&arrival.measurement);
     if (motion == nullptr || ++frame >= drive.poses.size()) continue;
     result.last = localizer.estimate();

@@ -54,8 +54,9 @@ struct VisionMemory {
   bool doubted = false;
   Stamp doubted_at;
   Pose doubted_pose;
-  bool has_wheels = false;  ///< false also once a step of the wheels since clone_stamp has corrected the motion
-  WheelSample wheels;       ///< at clone_stamp
+  bool has_wheels = false;
+  WheelSample wheels;                 ///< at clone_stamp
+  bool wheels_in_prediction = false;  ///< a step of the wheels since clone_stamp has corrected the motion
 };
 
 /// The current step of the wheels, or the current stop.

@@ -15,6 +15,8 @@ constexpr double kMaxRate_rad_s = 35, kMaxForce_m_s2 = 300;
 constexpr double kLevelError_m_s2 = 0.1;
 /// The IMU is used once its biases and the vertical are known this well: errors beyond are not linear any more.
 constexpr double kAlignedGyroBias_rad_s = 0.01, kAlignedUp_rad = 0.2;
+/// Standard deviations of the biases of an IMU that was excluded, where less is specified.
+constexpr double kChangedGyroBias_rad_s = 0.05, kChangedAccelBias_m_s2 = 0.3;
 /// An IMU that cannot be aligned for this long is suspect.
 constexpr double kSlowAlignment_s = 10;
 
@@ -130,11 +132,13 @@ void ErrorStateFilter::search_alignment(const ImuSample& sample) {
   }
 }
 
-/// The vertical counts little, because it is corrected by what is found; it makes a single motion enough.
+/// The vertical counts little, because it is corrected by what is found; it makes a single motion enough. Of an IMU
+/// that was contradicted the biases may have changed by any amount.
 AlignmentPrior ErrorStateFilter::alignment_prior() const {
   constexpr double kUpFactor = 3;
-  AlignmentPrior prior{options_.imu.gyro_bias_sigma_rad_s,
-                       options_.imu.accel_bias_sigma_m_s2,
+  const bool changed = memory_.monitor(LocalizationSensor::imu).state == SensorState::excluded;
+  AlignmentPrior prior{std::max(options_.imu.gyro_bias_sigma_rad_s, changed ? kChangedGyroBias_rad_s : 0),
+                       std::max(options_.imu.accel_bias_sigma_m_s2, changed ? kChangedAccelBias_m_s2 : 0),
                        options_.gravity_m_s2,
                        std::sqrt(memory_.estimate.covariance(error_at::kImuTime, error_at::kImuTime)),
                        std::nullopt,

@@ -203,22 +203,22 @@ bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis
 }
 
 /// Whether the IMU or the wheels contradict the motion by far. The wheels decide where they can: by their count since
-/// the last frame, or, if that is in the prediction already, by the distance predicted with constant velocity.
+/// the last frame, or, without an IMU, if that is in the prediction already, by the predicted distance. Wheels that
+/// were excluded, because the IMU contradicts them, still confirm a motion, but do not contradict it.
 bool ErrorStateFilter::is_wild_motion(const VisualMotion& visual, const Innovation& innovation,
                                       double inertial_nis) const {
+  const bool wheels_ok = memory_.monitor(LocalizationSensor::wheels).state == SensorState::ok;
   const std::optional<double> against_wheels = compare_with_wheels(visual);
-  if (against_wheels && *against_wheels > kWildFactor * gates_[4]) return true;
+  if (wheels_ok && against_wheels && *against_wheels > kWildFactor * gates_[4]) return true;
   if (memory_.vision.constant_velocity_s == 0) {
     return memory_.monitor(LocalizationSensor::imu).state == SensorState::ok &&
            inertial_nis > kWildFactor * vision_gate_ && !(against_wheels && *against_wheels <= gates_[4]);
   }
-  const bool wheels_in_prediction = !memory_.vision.has_wheels && wheels_at(visual.motion.to) &&
-                                    memory_.monitor(LocalizationSensor::wheels).state == SensorState::ok;
-  return wheels_in_prediction && translation_nis(memory_.estimate.covariance, innovation) > kWildFactor * gates_[3];
+  return wheels_ok && memory_.vision.wheels_in_prediction && against_wheels &&
+         translation_nis(memory_.estimate.covariance, innovation) > kWildFactor * gates_[3];
 }
 
-/// The step of the wheels since the last frame. None if they cannot tell, or if their counts are in the prediction
-/// already.
+/// The step of the wheels since the last frame. None if they cannot tell.
 std::optional<WheelStep> ErrorStateFilter::wheel_step_since_frame(Stamp stamp) const {
   const std::optional<WheelSample> wheels = wheels_at(stamp);
   if (!wheels || !memory_.vision.has_wheels) return std::nullopt;
@@ -229,7 +229,7 @@ std::optional<WheelStep> ErrorStateFilter::wheel_step_since_frame(Stamp stamp) c
 std::optional<double> ErrorStateFilter::compare_with_wheels(const VisualMotion& visual) const {
   const RelativeMotion& motion = visual.motion;
   const std::optional<WheelStep> step = wheel_step_since_frame(motion.to);
-  if (!step || memory_.monitor(LocalizationSensor::wheels).state != SensorState::ok) return std::nullopt;
+  if (!step) return std::nullopt;
   NavigationState seen;
   seen.world_from_body = motion.previous_from_current;
   seen.wheel_scale = memory_.estimate.state.wheel_scale;
@@ -256,7 +256,9 @@ void ErrorStateFilter::accept_doubted_motion() {
 std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const VisualMotion& visual) const {
   const RelativeMotion& motion = visual.motion;
   const std::optional<WheelStep> step = wheel_step_since_frame(motion.to);
-  if (!step || memory_.monitor(LocalizationSensor::wheels).state == SensorState::excluded) return std::nullopt;
+  if (!step || memory_.vision.wheels_in_prediction ||
+      memory_.monitor(LocalizationSensor::wheels).state == SensorState::excluded)
+    return std::nullopt;
   const NavigationState& s = memory_.estimate.state;
   const ErrorCovariance& p = memory_.estimate.covariance;
   const double counted_m = s.wheel_scale * step->counted_m;
@@ -300,6 +302,7 @@ void ErrorStateFilter::begin_frame(Stamp stamp) {
   const std::optional<WheelSample> wheels = wheels_at(stamp);
   memory_.vision.has_wheels = wheels.has_value();
   if (wheels) memory_.vision.wheels = *wheels;
+  memory_.vision.wheels_in_prediction = false;
   memory_.vision.constant_velocity_noise.setZero();
   memory_.vision.constant_velocity_s = 0;
   clone_pose(memory_.estimate, error_at::kVisionClone);

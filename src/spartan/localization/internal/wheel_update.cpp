@@ -33,7 +33,7 @@ void ErrorStateFilter::update(const WheelSample& sample) {
   if (memory_.step.has_wheels && seconds < options_.wheels.max_step_s) return;
   if (memory_.step.has_wheels && seconds <= kMaxSteps * options_.wheels.max_step_s) {
     update_by_step(sample);
-    memory_.vision.has_wheels = false;  // the prediction of the next visual motion contains this step
+    memory_.vision.wheels_in_prediction = true;
   }
   begin_step(sample);
 }
