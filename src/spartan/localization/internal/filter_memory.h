@@ -50,6 +50,7 @@ struct VisionMemory {
   /// Accumulated noise of the constant-velocity model (position, attitude, velocity), and for how long it was used.
   Matrix9d constant_velocity_noise = Matrix9d::Zero();
   double constant_velocity_s = 0;
+  bool reset = false;  ///< the last motion contradicted the IMU, so that the velocity is uncertain
   /// The last motion was rejected as wild; by it, world_from_imu at `doubted_at` would be `doubted_pose`.
   bool doubted = false;
   Stamp doubted_at;

@@ -2,6 +2,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "spartan/localization/internal/error_state_filter.h"
 #include "spartan/localization/internal/kalman_update.h"
@@ -97,7 +98,7 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
     propagate_drift(error_at::kVisionDrift, drift_sigma_ratios_, options_.vision.drift_correlation_frames);
     propagate_drift(error_at::kVisionConstant, constant_sigma_ratios_, kConstantSteps);
   }
-  const bool inertial = vision.constant_velocity_s == 0;
+  const bool inertial = vision.constant_velocity_s == 0, was_reset = std::exchange(vision.reset, false);
   const Matrix6d covariance = usable_covariance(motion.own_covariance(), options_.vision.white_noise_factor);
   const Innovation innovation = relative_motion_innovation(
       memory_.estimate.state, error_at::kVisionClone, motion.previous_from_current, covariance, visual.errors,
@@ -119,7 +120,12 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
   }
   if (!accept_vision(nis, vision_gate_, HealthReason::disagrees)) return false;
   SensorMonitor& imu = memory_.monitor(LocalizationSensor::imu);
-  if (inertial && imu.state == SensorState::suspect) imu.readmit();  // its prediction agrees with vision
+  if (inertial && imu.state == SensorState::suspect) {  // its prediction agrees with vision
+    const int failed = imu.failed_in_row;
+    imu.readmit();
+    // With the velocity of a reset prediction anything agrees, which does not end a series of contradictions.
+    if (was_reset) imu.failed_in_row = failed;
+  }
   correct_motion(innovation, error_at::kVisionClone);
   return true;
 }
@@ -193,6 +199,7 @@ void ErrorStateFilter::inflate_prediction(const Innovation& innovation, const Re
 /// rejection of the IMU.
 bool ErrorStateFilter::reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion) {
   inflate_prediction(innovation, motion);
+  memory_.vision.reset = true;
   memory_.step.stationary = false;
   memory_.monitor(LocalizationSensor::imu)
       .accept(nis, vision_gate_, HealthReason::contradicted, options_.health.excluded_after,
