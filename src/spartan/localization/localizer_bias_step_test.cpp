@@ -23,7 +23,10 @@ LocalizationEstimate driven_with_step(double period_s, const Eigen::Vector3d& gy
     imu->gyro_rad_s += gyro;
     imu->accel_m_s2 += accel;
   }
-  return driven(test_options(), all).estimate();
+  LocalizationOptions options = test_options();
+  options.imu.gyro_bias_sigma_rad_s = 1e-4;  // as specified: the step is far outside of it
+  options.imu.accel_bias_sigma_m_s2 = 0.01;
+  return driven(options, all).estimate();
 }
 
 double position_error(const LocalizationEstimate& e) {
