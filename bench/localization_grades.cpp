@@ -2,7 +2,8 @@
 // without a rest: `make bench-localization_grades ARGS="..."`.
 //
 //   localization_grades [--config FOLDER] [--from RECORDINGS] [--runs RUNS] [--errors NAME,NAME] [--seeds N]
-//                       [--first SEED] [--grades tactical,industrial,mems] [--delay-ms D] [SCENARIO...]
+//                       [--first SEED] [--grades tactical,industrial,mems] [--delay-ms D] [--misstated F]
+//                       [SCENARIO...]
 //
 // The true motion and the samples of the sensors are those of the simulator; nothing is rendered. The errors of the
 // odometry are those of rendered drives (RECORDINGS/NAME with the run RUNS/NAME), scaled to the covariance that
@@ -32,9 +33,22 @@ void without_rest(TrueDrive& drive) {
   drive.poses.erase(drive.poses.begin(), drive.poses.begin() + static_cast<std::ptrdiff_t>(first));
 }
 
+/// The true noise; what is stated stays.
+void scale_noise(sim::Scenario& scenario, double factor) {
+  sim::ImuOptions& imu = scenario.imu;
+  for (double* noise : {&imu.gyro_noise_rad_s_sqrt_hz, &imu.gyro_bias_rad_s, &imu.gyro_walk_rad_s2_sqrt_hz,
+                        &imu.accel_noise_m_s2_sqrt_hz, &imu.accel_bias_m_s2, &imu.accel_walk_m_s3_sqrt_hz})
+    *noise *= factor;
+  scenario.compass.sigma_deg *= factor;
+  scenario.compass.bias_deg *= factor;
+  scenario.inclinometer.sigma_deg *= factor;
+  scenario.inclinometer.bias_deg *= factor;
+}
+
 struct Setup {
   const TrueDrive& drive;
   LocalizationOptions options;
+  double misstated = 1;  ///< true over stated noise of all sensors but vision and wheels
   int first_seed = 1, seeds = 50;
 };
 
@@ -43,7 +57,9 @@ std::vector<TrialResult> trials_of(const Setup& setup, const Subset& subset, con
   workers.parallel_for(0, setup.seeds, 1, [&](int from, int to) {
     for (int i = from; i < to; ++i) {
       const auto seed = static_cast<std::uint64_t>(setup.first_seed + i);
-      const DrawnDrive d = draw(setup.drive, {}, setup.drive.scenario.compass, seed);
+      DrawnDrive d = draw(setup.drive, {}, setup.drive.scenario.compass, seed);
+      for (CompassSample& s : d.compass) s.sigma_rad /= setup.misstated;
+      for (InclinometerSample& s : d.inclinometer) s.sigma_rad /= setup.misstated;
       std::vector<Arrival> all = arrivals(d, subset);
       const Stamp start = sim::internal::stamp_at(setup.drive.frames_s.front());
       std::erase_if(all, [&](const Arrival& a) { return a.at_ns < start.ns; });
@@ -64,8 +80,9 @@ void print_grade(const std::string& name, const Setup& setup, const ThreadPool& 
   const Band three = band(3, setup.seeds);
   fmt::print(
       "\n### {} IMU\n\n| sensors | final error, % | minus vision alone | ATE, mm | minus vision alone | NEES position, "
-      "attitude | IMU aligned after, s, m | not aligned | IMU not ok, frames | clock, ms | its sigma, ms |\n"
-      "|---|---|---|---|---|---|---|---|---|---|---|\n",
+      "attitude | frames in its band, % | IMU aligned after, s, m | not aligned | IMU not ok, frames | clock, ms | its "
+      "sigma, ms |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|\n",
       name);
   std::vector<TrialResult> alone;
   int worse = 0;
@@ -104,10 +121,11 @@ void print_grade(const std::string& name, const Setup& setup, const ThreadPool& 
     const bool is_worse = e.mean - e.half_width > 0 || a.mean - a.half_width > 0;
     worse += is_worse ? 1 : 0;
     const double of_position = mean_of(position).mean, of_attitude = mean_of(attitude).mean;
-    fmt::print("| {}{} | {:.4f} | {:+.4f} ± {:.4f} | {:.2f} | {:+.2f} ± {:.2f} | {:.2f}{}, {:.2f}{} |", subset.name(),
-               is_worse ? " (worse)" : "", mean_of(end).mean, e.mean, e.half_width, mean_of(ate).mean, a.mean,
-               a.half_width, of_position, three.contains(of_position) ? "" : "*", of_attitude,
-               three.contains(of_attitude) ? "" : "*");
+    fmt::print("| {}{} | {:.4f} | {:+.4f} ± {:.4f} | {:.2f} | {:+.2f} ± {:.2f} | {:.2f}{}, {:.2f}{} | {:.0f}, {:.0f} |",
+               subset.name(), is_worse ? " (worse)" : "", mean_of(end).mean, e.mean, e.half_width, mean_of(ate).mean,
+               a.mean, a.half_width, of_position, three.contains(of_position) ? "" : "*", of_attitude,
+               three.contains(of_attitude) ? "" : "*", percent_in_band(trials, three, &FrameError::nees_position),
+               percent_in_band(trials, three, &FrameError::nees_attitude));
     if (subset.imu)
       fmt::print(" {:.1f}, {:.2f} | {:.0f} | {:.1f} | {:.1f} ± {:.1f} | {:.2f} |", largest(trials, seconds),
                  largest(trials, travelled), not_aligned, largest(trials, not_ok), mean_of(clock).mean,
@@ -132,7 +150,9 @@ void print_scenario(const std::string& name, const RecordingArguments& arguments
     drive->scenario.imu = sim::imu_of_grade(*kind);
     drive->scenario.imu.position_m = kPosition_m;
     drive->scenario.imu.delay_ms = arguments.number("--delay-ms");
-    Setup setup{*drive, options_for(*drive), arguments.number("--first"), arguments.number("--seeds")};
+    Setup setup{*drive, options_for(*drive), std::stod(arguments.options.at("--misstated")),
+                arguments.number("--first"), arguments.number("--seeds")};
+    scale_noise(drive->scenario, setup.misstated);
     setup.options.imu.position_m = Eigen::Map<const Eigen::Vector3d>(kPosition_m.data());
     if (grade == split(arguments.options.at("--grades")).front()) {
       const Band three = band(3, setup.seeds);
@@ -153,6 +173,7 @@ void run(const std::vector<std::string>& words) {
                                                         {"--seeds", "50"},
                                                         {"--first", "1"},
                                                         {"--grades", "tactical,industrial,mems"},
+                                                        {"--misstated", "1"},
                                                         {"--delay-ms", "20"}});
   if (arguments.scenarios.empty()) arguments.scenarios = {"rocky_20pct"};
   for (const std::string& name : arguments.scenarios) print_scenario(name, arguments);

@@ -54,18 +54,6 @@ std::vector<Arrival> nominal(const TrueDrive& drive, std::uint64_t seed, const S
   return arrivals(draw(drive, {}, drive.scenario.compass, seed), subset);
 }
 
-// Percentage of every fifth frame at which the mean NEES over the trials is inside the band.
-double percent_in_band(const std::vector<TrialResult>& trials, const Band& b, double FrameError::*nees) {
-  int inside = 0, count = 0;
-  for (std::size_t i = 0; i < trials[0].frames.size(); i += 5) {
-    double sum = 0;
-    for (const TrialResult& t : trials) sum += t.frames[i].*nees;
-    inside += b.contains(sum / static_cast<double>(trials.size())) ? 1 : 0;
-    ++count;
-  }
-  return 100.0 * inside / count;
-}
-
 void print_subsets(const TrueDrive& drive, const Seeds& seeds, const ThreadPool& workers) {
   const Band three = band(3, seeds.count), six = band(6, seeds.count);
   fmt::print("\n## {}: {:.0f} m, {} frames, {} seeds\n\n", drive.scenario.name, drive.length_m, drive.poses.size(),

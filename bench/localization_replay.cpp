@@ -72,7 +72,8 @@ void run(const std::vector<std::string>& words) {
     const auto drive = open_recorded(arguments.folder + "/" + name, arguments.options.at("--runs") + "/" + name);
     if (!drive) throw std::runtime_error(name + ": there is no recording with ground truth, or no run of it");
     for (int mask = 0; mask < 16; ++mask) {
-      const TrialResult r = run_trial(drive->truth, arrivals(drive->drawn, Subset::of(mask)));
+      const TrialResult r =
+          run_trial(drive->truth, arrivals(drive->drawn, Subset::of(mask)), options_for(drive->truth));
       fmt::print("| {} | {} | {:.4f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} |\n", name, Subset::of(mask).name(),
                  r.final_percent, 1e3 * r.ate_m, mean_nees(r, &FrameError::nees_position),
                  mean_nees(r, &FrameError::nees_attitude), mean_nees(r, &FrameError::nees_pose));

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <vector>
 
+#include "localization_trial.h"
+
 namespace spartan {
 
 struct Mean {
@@ -34,6 +36,18 @@ struct Band {
 };
 inline Band band(int dof, int trials) {
   return {chi_square_mean(-1.959964, dof, trials), chi_square_mean(1.959964, dof, trials)};
+}
+
+/// Percentage of every fifth frame at which the mean NEES over the trials is inside the band.
+inline double percent_in_band(const std::vector<TrialResult>& trials, const Band& b, double FrameError::*nees) {
+  int inside = 0, count = 0;
+  for (std::size_t i = 0; i < trials[0].frames.size(); i += 5) {
+    double sum = 0;
+    for (const TrialResult& t : trials) sum += t.frames[i].*nees;
+    inside += b.contains(sum / static_cast<double>(trials.size())) ? 1 : 0;
+    ++count;
+  }
+  return 100.0 * inside / count;
 }
 
 }  // namespace spartan
