@@ -89,12 +89,11 @@ class ErrorStateFilter {
   VisualMotion of_imu(const RelativeMotion& motion) const;
   bool update_by_motion(const VisualMotion& visual);
   void propagate_drift(int index, const Vector6d& sigmas, double steps);
-  bool prediction_contradicted(const Innovation& innovation) const;
   void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
   bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
   bool accept_vision(double nis, double gate, HealthReason why);
   bool doubt_motion(const VisualMotion& visual, const Innovation& innovation, double nis);
-  void remove_weight_of_prediction(const Innovation& innovation, const RelativeMotion& motion);
+  void follow_vision(const VisualMotion& visual, const Matrix6d& covariance);
   bool is_wild_motion(const VisualMotion& visual, const Innovation& innovation, double inertial_nis) const;
   std::optional<WheelStep> wheel_step_since_frame(Stamp stamp) const;
   std::optional<double> compare_with_wheels(const VisualMotion& visual) const;
@@ -104,7 +103,7 @@ class ErrorStateFilter {
 
   // Wheels and zero-velocity updates: wheel_update.cpp.
   void update(const WheelSample& sample);
-  void end_step_at_frame(Stamp stamp);
+  void end_step_at_frame(Stamp stamp, bool vision_alone);
   std::optional<WheelSample> wheels_at(Stamp stamp) const;
   void update_by_step(const WheelSample& sample);
   WheelStep step_between(const WheelSample& from, const WheelSample& to) const;

@@ -48,7 +48,7 @@ MotionSinceClone motion_since_clone(const NavigationState& s, int clone) {
 }
 
 Innovation relative_motion_innovation(const NavigationState& s, int clone, const Pose& measured,
-                                      const Matrix6d& covariance, const MotionErrors& errors, LinearizedAt at) {
+                                      const Matrix6d& covariance, const MotionErrors& errors) {
   const MotionSinceClone m = motion_since_clone(s, clone);
   Innovation i(6);
   const Vector6d drift = errors.drift * (s.vision_drift + s.vision_constant) + errors.by_calibration * s.calibration;
@@ -58,7 +58,7 @@ Innovation relative_motion_innovation(const NavigationState& s, int clone, const
   i.residual = r;
   i.jacobian = m.jacobian;
   i.jacobian.middleCols<6>(clone) = left * m.jacobian.middleCols<6>(clone);
-  if (at == LinearizedAt::estimate) i.jacobian.middleCols<6>(error_at::kPose) = left;
+  i.jacobian.middleCols<6>(error_at::kPose) = left;
   i.jacobian.middleCols<6>(error_at::kVisionDrift) = -right * errors.drift;
   i.jacobian.middleCols<6>(error_at::kVisionConstant) = i.jacobian.middleCols<6>(error_at::kVisionDrift);
   i.jacobian.middleCols<8>(error_at::kCalibration) = -right * errors.by_calibration;

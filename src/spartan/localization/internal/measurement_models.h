@@ -21,11 +21,8 @@ struct MotionErrors {
 ///   r = Log(M̂⁻¹ M Exp(d̂)) = J_l⁻¹(r) (ξ_x − Ad(M̂⁻¹) ξ_c) − J_r⁻¹(r) J_r(d̂) (D δz + E δη + n)
 /// linearized at the estimate. A shift of the whole drive, ξ_x = Ad(M̂⁻¹) ξ_c, has no effect, whatever r: with other
 /// factors before ξ_x and ξ_c the noise of r would seem to measure it (Huang, Mourikis & Roumeliotis, IJRR 2010).
-/// Linearized at the measured motion, for a prediction without weight, r may be large:
-///   r = ξ_x − J_l⁻¹(r) Ad(M̂⁻¹) ξ_c − J_r⁻¹(r) J_r(d̂) (D δz + E δη + n).
-enum class LinearizedAt { estimate, measured_motion };
 Innovation relative_motion_innovation(const NavigationState& state, int clone, const Pose& measured,
-                                      const Matrix6d& covariance, const MotionErrors& errors, LinearizedAt at);
+                                      const Matrix6d& covariance, const MotionErrors& errors);
 
 /// The estimated motion since a clone, with the Jacobian of its right perturbation.
 struct MotionSinceClone {

@@ -7,19 +7,14 @@
 #include "spartan/localization/internal/error_state_filter.h"
 #include "spartan/localization/internal/kalman_update.h"
 #include "spartan/localization/internal/measurement_models.h"
+#include "spartan/localization/internal/motion_composition.h"
 
 namespace spartan::internal {
 namespace {
 
-/// Before an update by vision the noise of the constant-velocity model is scaled by 1 + this, so that the prediction
-/// has no weight and the filter composes the visual motions.
-constexpr double kPredictionNoiseFactor = 99;
 /// Where vision contradicts the prediction, the standard deviation of the inflation is this factor times the residual;
 /// empirical.
 constexpr double kInflationFactor = 10;
-/// A constant-velocity prediction is inflated where the residual exceeds its standard deviation in any direction. With
-/// kPredictionNoiseFactor the expected value is 6/100.
-constexpr double kMaxPredictionNis = 1;
 /// Correlation length of the constant error of vision, in frames: finite, so that the filter does not become
 /// overconfident; empirical.
 constexpr double kConstantSteps = 5000;
@@ -70,13 +65,15 @@ void ErrorStateFilter::update(const RelativeMotion& of_body) {
   advance_to(motion.to);
   SensorMonitor& monitor = memory_.monitor(LocalizationSensor::vision);
   const bool consecutive = motion.from == memory_.vision.clone_stamp;
+  bool used = false;
   if (!motion.measured || !consecutive) {
     if (monitor.state != SensorState::excluded) monitor.state = SensorState::suspect;
     monitor.reason = HealthReason::lost;
     ++monitor.rejected;
     memory_.vision.stationary = false;
   } else {
-    if (update_by_motion(visual)) {
+    used = update_by_motion(visual);
+    if (used) {
       const NavigationState& s = memory_.estimate.state;
       const double seconds = seconds_between(motion.from, motion.to);
       memory_.vision.rate_rad_s =
@@ -84,7 +81,7 @@ void ErrorStateFilter::update(const RelativeMotion& of_body) {
     }
   }
   if (memory_.imu.known && !inertial_usable()) memory_.imu.window.add(motion);
-  end_step_at_frame(motion.to);
+  end_step_at_frame(motion.to, used && memory_.vision.constant_velocity_s > 0);
   // The clone stays over frames that are lost, as the landmarks of the odometry do.
   if (!consecutive || !motion.keeps_reference) begin_frame(motion.to);
 }
@@ -100,9 +97,8 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
   }
   const bool inertial = vision.constant_velocity_s == 0, was_reset = std::exchange(vision.reset, false);
   const Matrix6d covariance = usable_covariance(motion.own_covariance(), options_.vision.white_noise_factor);
-  const Innovation innovation = relative_motion_innovation(
-      memory_.estimate.state, error_at::kVisionClone, motion.previous_from_current, covariance, visual.errors,
-      inertial ? LinearizedAt::estimate : LinearizedAt::measured_motion);
+  const Innovation innovation = relative_motion_innovation(memory_.estimate.state, error_at::kVisionClone,
+                                                           motion.previous_from_current, covariance, visual.errors);
   const double nis = inertial ? normalized_innovation_squared(memory_.estimate.covariance, innovation) : 0;
   const auto forward = inertial ? compare_forward(visual) : std::nullopt;
   constexpr double kOutvoted = kOutvotedSigmas * kOutvotedSigmas;
@@ -110,7 +106,11 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
     return accept_vision(forward->vision_nis, kOutvoted, HealthReason::outvoted);
   if (doubt_motion(visual, innovation, nis)) return false;
 
-  if (!inertial) remove_weight_of_prediction(innovation, motion);
+  if (!inertial) {
+    if (!accept_vision(0, vision_gate_, HealthReason::none)) return false;
+    follow_vision(visual, covariance);
+    return true;
+  }
   if (nis > vision_gate_) {
     // Vision that is excluded resets the prediction only where the wheels contradict the IMU, too.
     const bool wheels_contradict_imu = forward && !forward->imu_and_wheels_agree;
@@ -120,7 +120,7 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
   }
   if (!accept_vision(nis, vision_gate_, HealthReason::disagrees)) return false;
   SensorMonitor& imu = memory_.monitor(LocalizationSensor::imu);
-  if (inertial && imu.state == SensorState::suspect) {  // its prediction agrees with vision
+  if (imu.state == SensorState::suspect) {  // its prediction agrees with vision
     const int failed = imu.failed_in_row;
     imu.readmit();
     // With the velocity of a reset prediction anything agrees, which does not end a series of contradictions.
@@ -154,11 +154,18 @@ bool ErrorStateFilter::doubt_motion(const VisualMotion& visual, const Innovation
   return vision.doubted;
 }
 
-/// A constant-velocity prediction gets no weight against vision. Its noise grows with the speed: after a stop it is
-/// small, and the update would put the residual of a true motion into the drift of vision.
-void ErrorStateFilter::remove_weight_of_prediction(const Innovation& innovation, const RelativeMotion& motion) {
-  memory_.estimate.covariance.topLeftCorner<9, 9>() += kPredictionNoiseFactor * memory_.vision.constant_velocity_noise;
-  if (prediction_contradicted(innovation)) inflate_prediction(innovation, motion);
+/// Without an IMU the pose follows from the visual motion alone: a prediction with constant velocity would not be
+/// independent of it, and after a stop it would be certain of a speed of zero.
+void ErrorStateFilter::follow_vision(const VisualMotion& visual, const Matrix6d& covariance) {
+  StateEstimate& e = memory_.estimate;
+  compose_motion(e, error_at::kVisionClone, visual.motion.previous_from_current, covariance, visual.errors);
+  const Pose motion = motion_since_clone(e.state, error_at::kVisionClone).clone_from_body;
+  memory_.world_from_odom = e.state.world_from_body * (memory_.vision.odom_from_clone * motion).inverse();
+  // The end of a random walk of the velocity whose integral is known has a quarter of its variance.
+  const double seconds = seconds_between(visual.motion.from, visual.motion.to);
+  const ConstantVelocityOptions& o = options_.constant_velocity;
+  const double walk = o.speed_sigma_ratio_per_sqrt_s * (motion.translation().norm() / seconds + o.speed_offset_m_s);
+  set_velocity(e, motion, seconds, 0.25 * walk * walk * seconds);
 }
 
 /// One step of a Gauss–Markov process.
@@ -170,16 +177,6 @@ void ErrorStateFilter::propagate_drift(int index, const Vector6d& sigmas, double
   p.middleRows<6>(index) *= stays;
   p.middleCols<6>(index) *= stays;
   p.diagonal().segment<6>(index) += (1 - stays * stays) * sigmas.cwiseAbs2();
-}
-
-/// Whether the residual exceeds the predicted covariance of the motion itself, without the errors of vision.
-bool ErrorStateFilter::prediction_contradicted(const Innovation& innovation) const {
-  Innovation exact = innovation;
-  exact.jacobian.middleCols<6>(error_at::kVisionDrift).setZero();
-  exact.jacobian.middleCols<6>(error_at::kVisionConstant).setZero();
-  exact.jacobian.middleCols<8>(error_at::kCalibration).setZero();
-  exact.noise = kMinVariance * Matrix6d::Identity();
-  return normalized_innovation_squared(memory_.estimate.covariance, exact) > kMaxPredictionNis;
 }
 
 /// Inflates the covariance of the motion since the last frame until the prediction has no weight against a motion with

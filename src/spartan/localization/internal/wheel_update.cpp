@@ -50,11 +50,14 @@ std::optional<WheelSample> ErrorStateFilter::wheels_at(Stamp stamp) const {
 }
 
 /// Steps end with frames, so that vision and wheels measure the same motion.
-void ErrorStateFilter::end_step_at_frame(Stamp stamp) {
+void ErrorStateFilter::end_step_at_frame(Stamp stamp, bool vision_alone) {
   if (still_stationary()) return;
   const std::optional<WheelSample> wheels = wheels_at(stamp);
   const double seconds = seconds_between(memory_.step.from, stamp);
-  if (wheels && memory_.step.has_wheels && seconds >= kMinStep_s && seconds <= kMaxSteps * options_.wheels.max_step_s)
+  // A step that began after the last frame adds nothing to a motion that vision alone has measured.
+  const bool redundant = vision_alone && memory_.vision.wheels_in_prediction;
+  if (wheels && !redundant && memory_.step.has_wheels && seconds >= kMinStep_s &&
+      seconds <= kMaxSteps * options_.wheels.max_step_s)
     update_by_step(*wheels);
   begin_step(wheels);
 }
@@ -163,8 +166,8 @@ void ErrorStateFilter::update_zero_velocity(bool imu_stationary) {
   Matrix6d covariance = Matrix6d::Zero();
   covariance.diagonal().head<3>().setConstant(std::pow(options_.zero_velocity.position_sigma_m, 2));
   covariance.diagonal().tail<3>().setConstant(std::pow(options_.zero_velocity.attitude_sigma_rad, 2));
-  const Innovation innovation = relative_motion_innovation(memory_.estimate.state, error_at::kStepClone, Pose(),
-                                                           covariance, {}, LinearizedAt::estimate);
+  const Innovation innovation =
+      relative_motion_innovation(memory_.estimate.state, error_at::kStepClone, Pose(), covariance, {});
   if (normalized_innovation_squared(memory_.estimate.covariance, innovation) > gates_[6]) {
     begin_step(wheels_at(memory_.stamp));
     return;
