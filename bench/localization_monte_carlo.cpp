@@ -4,10 +4,9 @@
 //                            [--from RECORDINGS] [--runs RUNS] [--errors NAME,NAME] [SCENARIO...]
 //
 // The true motion comes from the simulator; for each seed the sensor errors are drawn anew, and the odometry errors
-// from a model (MeasuredOdometryError) or, with --errors, from those of rendered drives (resampled_odometry.h). Nothing
-// is rendered. Trials are paired: all
-// subsets of sensors use the same drive, the same samples and the same odometry. Default: rocky_20pct, crater_rim,
-// loop.
+// are those of rendered drives NAME, from a random place on (resampled_odometry.h). Nothing is rendered. Trials are
+// paired: all subsets of sensors use the same drive, the same samples and the same odometry. Default: rocky_20pct,
+// crater_rim, loop.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -389,16 +388,16 @@ void run(const std::vector<std::string>& words) {
   const ThreadPool workers(arguments.number("--threads"));
   const Seeds seeds{arguments.number("--first"), arguments.number("--seeds")};
   fmt::print(
-      "# Localization, Monte Carlo\n\nOdometry errors: {}. Final error: of the last "
+      "# Localization, Monte Carlo\n\nOdometry errors of {}. Final error: of the last "
       "position, "
       "over the distance travelled; ATE: RMS position error over the frames; both relative to the first pose. ±: 95 % "
       "confidence interval of the paired difference.\n",
-      arguments.options.at("--errors").empty() ? "a model" : "those of " + arguments.options.at("--errors"));
+      arguments.options.at("--errors"));
   for (const std::string& name : arguments.scenarios) {
     auto drive = open_true_drive(arguments.options.at("--config"), name);
     if (!drive)
       throw std::runtime_error(fmt::format("{}: no such scenario in {}", name, arguments.options.at("--config")));
-    if (!arguments.options.at("--errors").empty()) drive->odometry = resampled_odometry(arguments, name);
+    drive->odometry = resampled_odometry(arguments, name);
     const std::string& tables = arguments.options.at("--tables");
     if (tables == "all" || tables == "subsets") print_subsets(*drive, seeds, workers);
     if (tables == "all" || tables == "faults") print_faults(*drive, seeds, workers);

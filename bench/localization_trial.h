@@ -45,7 +45,7 @@ struct TrueDrive {
   std::vector<double> frames_s;
   std::vector<Pose> poses;  ///< at the frames
   double length_m = 0;      ///< of the polyline through the poses
-  /// Visual motions with the errors of a seed; unset: MeasuredOdometryError.
+  /// Visual motions with the errors of a seed.
   std::function<std::vector<RelativeMotion>(const TrueDrive&, std::uint64_t seed)> odometry;
 };
 
@@ -85,47 +85,6 @@ struct DrawnDrive {
   std::vector<RelativeMotion> motions;
 };
 
-/// Error model of visual odometry, measured on nine rendered drives (docs/math/localization.md, "Vision"): white noise
-/// of 1.10 times the reported covariance (mean of rocky_20pct, body frame), and a correlated part in units of the
-/// reported standard deviations: a Gauss-Markov process with a correlation length of 57 frames, and a constant of the
-/// drive of 1.53 times its variance.
-struct MeasuredOdometryError {
-  Vector6d sigma = (Vector6d() << 27.0e-6, 16.7e-6, 23.1e-6, 34.5e-6, 22.5e-6, 20.9e-6).finished();
-  Vector6d correlated_variance = (Vector6d() << 0.718, 0.372, 0.104, 0.316, 0.209, 0.116).finished();
-  double white = 1.10, constant = 1.53, steps = 57;
-
-  Matrix6d reported_covariance() const {
-    Matrix6d c = Matrix6d::Identity();
-    const auto set = [&](int i, int j, double value) { c(i, j) = c(j, i) = value; };
-    set(0, 1, -0.162), set(0, 2, -0.629), set(0, 3, -0.024), set(0, 4, -0.417), set(0, 5, 0.077);
-    set(1, 2, 0.160), set(1, 3, -0.107), set(1, 4, 0.109), set(1, 5, -0.803);
-    set(2, 3, 0.021), set(2, 4, 0.839), set(2, 5, -0.076), set(3, 4, 0.031), set(3, 5, 0.006), set(4, 5, -0.063);
-    return sigma.asDiagonal() * c * sigma.asDiagonal();
-  }
-
-  std::vector<RelativeMotion> draw(const TrueDrive& drive, std::uint64_t seed) const {
-    Random random(seed, 301);
-    const auto normal6 = [&] {
-      Vector6d v;
-      for (int i = 0; i < 6; ++i) v[i] = random.normal();
-      return v;
-    };
-    const Matrix6d covariance = reported_covariance(), root = covariance.llt().matrixL();
-    const Vector6d correlated_sigma = correlated_variance.cwiseSqrt();
-    const Vector6d constant_part = std::sqrt(constant) * correlated_sigma.cwiseProduct(normal6());
-    Vector6d markov_part = correlated_sigma.cwiseProduct(normal6());
-    const double keep = std::exp(-1 / steps);
-    std::vector<RelativeMotion> motions;
-    for (std::size_t i = 1; i < drive.poses.size(); ++i) {
-      markov_part = keep * markov_part + std::sqrt(1 - keep * keep) * correlated_sigma.cwiseProduct(normal6());
-      const Vector6d error = std::sqrt(white) * (root * normal6()) + sigma.cwiseProduct(constant_part + markov_part);
-      motions.push_back({sim::internal::stamp_at(drive.frames_s[i - 1]), sim::internal::stamp_at(drive.frames_s[i]),
-                         drive.poses[i - 1].inverse() * drive.poses[i] * exp_se3(-error), covariance, true});
-    }
-    return motions;
-  }
-};
-
 inline DrawnDrive draw(const TrueDrive& drive, const sim::SensorFaults& faults, const sim::CompassOptions& compass,
                        std::uint64_t seed) {
   const sim::Scenario& s = drive.scenario;
@@ -134,7 +93,7 @@ inline DrawnDrive draw(const TrueDrive& drive, const sim::SensorFaults& faults, 
   d.wheels = sim::internal::measure_wheels(*drive.motion, s.chassis, s.wheels, faults, seed);
   d.compass = sim::internal::measure_compass(*drive.motion, compass, faults, seed);
   d.inclinometer = sim::internal::measure_inclinometer(*drive.motion, s.inclinometer, faults, seed);
-  d.motions = drive.odometry ? drive.odometry(drive, seed) : MeasuredOdometryError().draw(drive, seed);
+  d.motions = drive.odometry(drive, seed);
   return d;
 }
 
