@@ -54,9 +54,11 @@ struct Pass {
 std::vector<RelativeMotion> exact_motions(const TrueDrive& drive, std::uint64_t /*seed*/) {
   constexpr double kSigma = 3e-5;
   std::vector<RelativeMotion> motions;
-  for (std::size_t i = 1; i < drive.poses.size(); ++i)
+  motions.reserve(drive.poses.size());
+  for (std::size_t i = 1; i < drive.poses.size(); ++i) {
     motions.push_back({sim::internal::stamp_at(drive.frames_s[i - 1]), sim::internal::stamp_at(drive.frames_s[i]),
                        drive.poses[i - 1].inverse() * drive.poses[i], kSigma * kSigma * Matrix6d::Identity()});
+  }
   return motions;
 }
 

@@ -19,6 +19,11 @@ std::string run_summary_text(const std::string& summary_json, const std::string&
       s["peak_memory_bytes"].get<double>() / 1e6);
   text += fmt::format("odometry: {} tracking, {} degraded, {} stationary, {} lost\n", health["tracking"].get<int>(),
                       health["degraded"].get<int>(), health["standing"].get<int>(), health["lost"].get<int>());
+  const auto& slip = s["health"]["wheel_slip"];
+  for (const auto& alarm : slip.is_null() ? nlohmann::json::array() : slip["alarms"]) {
+    text += fmt::format("wheels slip by up to {:.0f} % from {} ns to {} ns\n", 100 * alarm["largest"].get<double>(),
+                        alarm["from_ns"].get<std::int64_t>(), alarm["to_ns"].get<std::int64_t>());
+  }
   std::string absent;
   for (const auto& part : s["absent"]) absent += (absent.empty() ? "" : ", ") + part.get<std::string>();
   if (!absent.empty()) text += "disabled: " + absent + "\n";

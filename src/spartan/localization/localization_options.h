@@ -166,6 +166,7 @@ struct WheelOdometryOptions {
   double min_sigma_m = 0.002;            ///< m, minimum standard deviation of a step
   double max_step_s = 2.5;               ///< s, longest step
   double min_slip_distance_m = 0.02;     ///< m, shortest step that slip is reported for
+  double slip_alarm = 0.4;               ///< slip beyond which the summary of a run has an alarm
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -220,6 +221,10 @@ struct WheelOdometryOptions {
         "Longest interval between two updates by the wheels in seconds (each stereo frame is an update); raising it "
         "gives fewer updates over longer distances.",
         between(0.1, 100));
+    v.field("slip_alarm", slip_alarm,
+            "Slip (1 - travelled / counted) beyond which the summary of a run has an alarm; raising it reports fewer "
+            "places where the wheels spin.",
+            between(0, 1));
     v.renamed("least_slip_distance_m", "min_slip_distance_m");
     v.field(
         "min_slip_distance_m", min_slip_distance_m,

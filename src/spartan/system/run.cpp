@@ -130,6 +130,7 @@ RunFacts facts_of(const RunRequest& request, const FrameSource& source, const Ru
   facts.format = name_of(source.info().format);
   facts.gravity_measured = run_loop.gravity_measured();
   facts.heading_east = run_loop.heading_east();
+  facts.slip_alarm = options.localization.wheels.slip_alarm;
   facts.threads = request.threads;
   facts.absent = disabled_stages(options);
   facts.sensor_rows_reversed = source.sensor_samples_discarded();

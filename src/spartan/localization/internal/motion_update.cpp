@@ -24,6 +24,8 @@ constexpr double kAgreeSigmas = 3, kOutvotedSigmas = 5;
 /// A visual motion is wild where the IMU or the wheels contradict it by this factor times the gate: 12 standard
 /// deviations.
 constexpr double kWildFactor = 4;
+/// A contradiction is gross beyond this factor times the gate: 60 standard deviations.
+constexpr double kGrossFactor = 100;
 /// Added to the variances of a motion (m², rad²), whose covariance may be singular.
 constexpr double kMinVariance = 1e-14;
 
@@ -123,8 +125,8 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
   if (imu.state == SensorState::suspect) {  // its prediction agrees with vision
     const int failed = imu.failed_in_row;
     imu.readmit();
-    // With the velocity of a reset prediction anything agrees, which does not end a series of contradictions.
-    if (was_reset) imu.failed_in_row = failed;
+    // With the velocity of a reset prediction anything agrees, which does not end a series of gross contradictions.
+    if (was_reset && imu.nis > kGrossFactor * vision_gate_) imu.failed_in_row = failed;
   }
   correct_motion(innovation, error_at::kVisionClone);
   return true;

@@ -9,6 +9,7 @@
 
 #include "spartan/core/time.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/system/internal/wheel_slip.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan::internal {
@@ -74,6 +75,16 @@ struct GapWithoutPose {
     return fmt::format("{} frames skipped in {:.1f} s, the first: {}", frames, seconds, first->fault);
   }
 };
+
+// Null without wheels.
+Json wheel_slip(const std::vector<FrameRecord>& frames, double limit) {
+  const auto slip = wheel_slip_of(frames, limit);
+  if (!slip) return nullptr;
+  Json alarms = Json::array();
+  for (const SlipAlarm& alarm : slip->alarms)
+    alarms.push_back({{"from_ns", alarm.from.ns}, {"to_ns", alarm.to.ns}, {"largest", alarm.largest}});
+  return {{"median", slip->median}, {"largest", slip->largest}, {"alarms", alarms}};
+}
 
 }  // namespace
 
@@ -149,7 +160,8 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"threads", facts.threads},
       {"absent", facts.absent},
       {"stages", stages(frames)},
-      {"health", {{"odometry", health}, {"localization", sensors}}},
+      {"health",
+       {{"odometry", health}, {"localization", sensors}, {"wheel_slip", wheel_slip(frames, facts.slip_alarm)}}},
       {"lost_spans", spans},
       {"resumed_from_frame", facts.resumed_from_frame ? Json(*facts.resumed_from_frame) : Json(nullptr)},
   };

@@ -19,6 +19,7 @@ struct RunFacts {
   bool gravity_measured = false;
   bool level_by_ground = false;  ///< not measured by a sensor: z of the world is the normal of the first ground
   bool heading_east = false;
+  double slip_alarm = 1;  ///< slip of the wheels beyond which there is an alarm
   int threads = 1;
   std::vector<std::string> absent;           ///< stages that the options disable
   double wall_seconds = 0, cpu_seconds = 0;  ///< of the whole run
