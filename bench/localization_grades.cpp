@@ -127,10 +127,11 @@ void print_grade(const std::string& name, const Setup& setup, const ThreadPool& 
                a.mean, a.half_width, of_position, three.contains(of_position) ? "" : "*", of_attitude,
                three.contains(of_attitude) ? "" : "*", percent_in_band(trials, three, &FrameError::nees_position),
                percent_in_band(trials, three, &FrameError::nees_attitude));
-    if (subset.imu)
+    if (subset.imu) {
       fmt::print(" {:.1f}, {:.2f} | {:.0f} | {:.1f} | {:.1f} ± {:.1f} | {:.2f} |", largest(trials, seconds),
                  largest(trials, travelled), not_aligned, largest(trials, not_ok), mean_of(clock).mean,
                  mean_of(clock).half_width, mean_of(clock_sigma).mean);
+    }
     fmt::print("\n");
     std::fflush(stdout);
   }
