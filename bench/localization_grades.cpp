@@ -118,8 +118,7 @@ void print_grade(const std::string& name, const Setup& setup, const ThreadPool& 
       return static_cast<double>(t.frames.size()) - states[static_cast<std::size_t>(SensorState::ok)];
     };
     const Mean e = mean_of(end_more), a = mean_of(ate_more);
-    // By more than half of the last digit that is printed.
-    const bool is_worse = e.mean - e.half_width > 5e-5 || a.mean - a.half_width > 5e-3;
+    const bool is_worse = e.mean - e.half_width > 0 || a.mean - a.half_width > 0;
     worse += is_worse ? 1 : 0;
     const double of_position = mean_of(position).mean, of_attitude = mean_of(attitude).mean;
     fmt::print("| {}{} | {:.4f} | {:+.4f} ± {:.4f} | {:.2f} | {:+.2f} ± {:.2f} | {:.2f}{}, {:.2f}{} | {:.0f}, {:.0f} |",

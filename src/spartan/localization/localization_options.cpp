@@ -1,6 +1,29 @@
 #include "spartan/localization/localization_options.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace spartan {
+namespace {
+
+/// Largest scatter of a stationary sensor: its threshold, or twice its noise if that is more.
+double largest_scatter(double threshold, double density, double interval_s) {
+  return std::max(threshold, 2 * density / std::sqrt(std::max(interval_s, 1e-6)));
+}
+
+}  // namespace
+
+double InertialOptions::max_time_error_s() const {
+  return std::min(3 * time_offset_sigma_s, 0.1);
+}
+
+double InertialOptions::stationary_gyro(double interval_s) const {
+  return largest_scatter(stationary_gyro_rad_s, gyro_noise_rad_s_sqrt_hz, interval_s);
+}
+
+double InertialOptions::stationary_accel(double interval_s) const {
+  return largest_scatter(stationary_accel_m_s2, accel_noise_m_s2_sqrt_hz, interval_s);
+}
 
 LocalizationOptions with_specified_noise(LocalizationOptions options, const SensorNoise& specified,
                                          const GivenKeys& given) {

@@ -2,8 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "spartan/camera/samples.h"
@@ -32,15 +30,11 @@ struct InertialOptions {
   double stationary_accel_m_s2 = 0.03;  ///< m/s², threshold on the standard deviation of a stationary accelerometer
 
   /// Largest error of the clock that can be estimated: readings with stamps up to this far ahead are waited for.
-  double max_time_error_s() const { return std::min(3 * time_offset_sigma_s, 0.1); }
+  double max_time_error_s() const;
 
   /// Largest standard deviations of the readings of a stationary rover, `interval_s` apart.
-  double stationary_gyro(double interval_s) const {
-    return std::max(stationary_gyro_rad_s, 2 * gyro_noise_rad_s_sqrt_hz / std::sqrt(std::max(interval_s, 1e-6)));
-  }
-  double stationary_accel(double interval_s) const {
-    return std::max(stationary_accel_m_s2, 2 * accel_noise_m_s2_sqrt_hz / std::sqrt(std::max(interval_s, 1e-6)));
-  }
+  double stationary_gyro(double interval_s) const;
+  double stationary_accel(double interval_s) const;
 
   template <class Visitor>
   void describe(Visitor& v) {
