@@ -12,7 +12,6 @@
 #include <cstdlib>
 #include <numbers>
 #include <numeric>
-#include <sstream>
 #include <stdexcept>
 
 #include "real_drives.h"
@@ -237,16 +236,7 @@ void run(const std::vector<std::string>& words) {
       {{"--data", data != nullptr ? data : "../shared/data"}, {"--runs", "runs"}, {"--errors", ""}, {"--seeds", "5"}});
   if (arguments.scenarios.empty()) arguments.scenarios = {"euroc_v101", "tumvi_room1", "kitti_0013"};
   const std::string& runs = arguments.options.at("--runs");
-  std::vector<WhitenedErrors> drives;
-  std::stringstream names(arguments.options.at("--errors"));
-  for (std::string name; std::getline(names, name, ',');) {
-    auto errors = whitened_errors(fmt::format("{}/{}", arguments.folder, name), fmt::format("{}/{}", runs, name));
-    if (!errors || errors->empty())
-      throw std::runtime_error(name + ": there is no recording with ground truth, or no run");
-    drives.push_back(std::move(*errors));
-  }
-  if (drives.empty()) throw std::runtime_error("--errors: names no rendered drives");
-  const OdometryErrors errors(std::move(drives));
+  const OdometryErrors errors = odometry_errors(arguments.folder, runs, arguments.options.at("--errors"));
   for (const std::string& name : arguments.scenarios) {
     const std::string folder = fmt::format("{}/{}", arguments.options.at("--data"), name),
                       run_of_it = fmt::format("{}/{}", runs, name);

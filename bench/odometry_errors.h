@@ -1,10 +1,14 @@
 // Errors of visual odometry as measured on rendered drives, to be added to motions that are known.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -114,5 +118,27 @@ class OdometryErrors {
  private:
   std::vector<WhitenedErrors> drives_;
 };
+
+/// The parts of a list with commas.
+inline std::vector<std::string> split(const std::string& list) {
+  std::vector<std::string> names;
+  std::stringstream in(list);
+  for (std::string name; std::getline(in, name, ',');) names.push_back(name);
+  return names;
+}
+
+/// Of the recordings folder/NAME with the runs runs/NAME, for each NAME of a list with commas. Throws
+/// std::runtime_error.
+inline OdometryErrors odometry_errors(const std::string& folder, const std::string& runs, const std::string& list) {
+  std::vector<WhitenedErrors> drives;
+  for (const std::string& name : split(list)) {
+    auto errors = whitened_errors(fmt::format("{}/{}", folder, name), fmt::format("{}/{}", runs, name));
+    if (!errors || errors->empty())
+      throw std::runtime_error(name + ": there is no recording with ground truth, or no run");
+    drives.push_back(std::move(*errors));
+  }
+  if (drives.empty()) throw std::runtime_error("--errors: names no rendered drives");
+  return OdometryErrors(std::move(drives));
+}
 
 }  // namespace spartan

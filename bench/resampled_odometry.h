@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <memory>
-#include <sstream>
 #include <stdexcept>
 
 #include "localization_trial.h"
@@ -12,13 +11,6 @@
 #include "standard_recordings.h"
 
 namespace spartan {
-
-inline std::vector<std::string> split(const std::string& list) {
-  std::vector<std::string> names;
-  std::stringstream in(list);
-  for (std::string name; std::getline(in, name, ',');) names.push_back(name);
-  return names;
-}
 
 /// Typical covariance of the motions of a run, body frame.
 struct ReportedMotion {
@@ -55,17 +47,10 @@ inline std::vector<RelativeMotion> motions_with_errors(const TrueDrive& drive, c
 inline decltype(TrueDrive::odometry) resampled_odometry(const RecordingArguments& arguments,
                                                         const std::string& scenario) {
   const std::string& runs = arguments.options.at("--runs");
-  const auto recording = [&](const std::string& name) { return fmt::format("{}/{}", arguments.folder, name); };
-  std::vector<WhitenedErrors> drives;
-  for (const std::string& name : split(arguments.options.at("--errors"))) {
-    auto errors = whitened_errors(recording(name), fmt::format("{}/{}", runs, name));
-    if (!errors || errors->empty())
-      throw std::runtime_error(name + ": there is no recording with ground truth, or no run");
-    drives.push_back(std::move(*errors));
-  }
-  if (drives.empty()) throw std::runtime_error("--errors: names no rendered drives");
-  const auto errors = std::make_shared<const OdometryErrors>(std::move(drives));
-  const ReportedMotion reported = reported_motion(recording(scenario), fmt::format("{}/{}", runs, scenario));
+  const auto errors =
+      std::make_shared<const OdometryErrors>(odometry_errors(arguments.folder, runs, arguments.options.at("--errors")));
+  const ReportedMotion reported =
+      reported_motion(fmt::format("{}/{}", arguments.folder, scenario), fmt::format("{}/{}", runs, scenario));
   return [errors, reported](const TrueDrive& drive, std::uint64_t seed) {
     return motions_with_errors(drive, reported, *errors, seed);
   };

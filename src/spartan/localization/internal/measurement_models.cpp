@@ -47,13 +47,17 @@ MotionSinceClone motion_since_clone(const NavigationState& s, int clone) {
   return m;
 }
 
+Vector6d lasting_error(const NavigationState& s, const MotionErrors& errors) {
+  return errors.drift * (s.vision_drift + s.vision_constant) + errors.by_calibration * s.calibration;
+}
+
 Innovation relative_motion_innovation(const NavigationState& s, int clone, const Pose& measured,
                                       const Matrix6d& covariance, const MotionErrors& errors) {
   const MotionSinceClone m = motion_since_clone(s, clone);
   Innovation i(6);
-  const Vector6d drift = errors.drift * (s.vision_drift + s.vision_constant) + errors.by_calibration * s.calibration;
-  const Vector6d r = log_se3(m.clone_from_body.inverse() * measured * exp_se3(drift));
-  const Matrix6d right = right_jacobian_inverse_se3(r) * right_jacobian_se3(drift),
+  const Vector6d lasting = lasting_error(s, errors);
+  const Vector6d r = log_se3(m.clone_from_body.inverse() * measured * exp_se3(lasting));
+  const Matrix6d right = right_jacobian_inverse_se3(r) * right_jacobian_se3(lasting),
                  left = right_jacobian_inverse_se3(-r);
   i.residual = r;
   i.jacobian = m.jacobian;

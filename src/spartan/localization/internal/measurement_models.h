@@ -15,6 +15,9 @@ struct MotionErrors {
   Eigen::Matrix<double, 6, 8> by_calibration = Eigen::Matrix<double, 6, 8>::Zero();
 };
 
+/// d̂ = D ẑ + E η̂, the estimate of the errors that last.
+Vector6d lasting_error(const NavigationState& state, const MotionErrors& errors);
+
 /// A motion measured from a clone (`index`: kVisionClone or kStepClone) to the present pose, M = Ĉ⁻¹ X̂ Exp(e) with
 /// noise n, drift z and errors of the calibration η on the right, M = … Exp(−d − n) with d = D z + E η. After
 /// correction by the estimate d̂,

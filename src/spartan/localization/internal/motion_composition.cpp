@@ -2,17 +2,17 @@
 
 namespace spartan::internal {
 
-void compose_motion(StateEstimate& estimate, int clone, const Pose& measured, const Matrix6d& covariance,
+void compose_motion(StateEstimate& estimate, const Pose& measured, const Matrix6d& covariance,
                     const MotionErrors& errors) {
   NavigationState& s = estimate.state;
   ErrorCovariance& p = estimate.covariance;
-  const Vector6d lasting = errors.drift * (s.vision_drift + s.vision_constant) + errors.by_calibration * s.calibration;
+  const Vector6d lasting = lasting_error(s, errors);
   const Pose motion = measured * exp_se3(lasting);
-  s.world_from_body = (clone == error_at::kVisionClone ? s.world_from_vision_clone : s.world_from_step_clone) * motion;
+  s.world_from_body = s.world_from_vision_clone * motion;
 
   const Matrix6d right = right_jacobian_se3(lasting);
   Eigen::Matrix<double, 6, error_at::kSize> by = Eigen::Matrix<double, 6, error_at::kSize>::Zero();
-  by.middleCols<6>(clone) = adjoint(motion.inverse());
+  by.middleCols<6>(error_at::kVisionClone) = adjoint(motion.inverse());
   by.middleCols<6>(error_at::kVisionDrift) = right * errors.drift;
   by.middleCols<6>(error_at::kVisionConstant) = by.middleCols<6>(error_at::kVisionDrift);
   by.middleCols<8>(error_at::kCalibration) = right * errors.by_calibration;

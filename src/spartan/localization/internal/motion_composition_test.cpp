@@ -40,7 +40,7 @@ TEST(MotionComposition, IsTheUpdateOfAPredictionWithoutWeight) {
     const Pose measured = before.state.world_from_vision_clone.inverse() * before.state.world_from_body *
                           exp_se3(0.05 * Vector6d::Ones());
     StateEstimate composed = before;
-    compose_motion(composed, error_at::kVisionClone, measured, covariance, errors);
+    compose_motion(composed, measured, covariance, errors);
 
     StateEstimate predicted = before;
     predicted.state.world_from_body = composed.state.world_from_body;
@@ -62,7 +62,7 @@ TEST(MotionComposition, CovarianceIsThatOfDrawnErrors) {
   const Matrix6d covariance = random_covariance(random, 1e-3);
   const Pose measured = exp_se3((Vector6d() << 0.3, -0.1, 0.05, 0.1, 0.2, -0.3).finished());
   StateEstimate composed = before;
-  compose_motion(composed, error_at::kVisionClone, measured, covariance, errors);
+  compose_motion(composed, measured, covariance, errors);
   const ErrorCovariance root = before.covariance.llt().matrixL();
   const Matrix6d noise_root = covariance.llt().matrixL();
   Matrix6d scatter = Matrix6d::Zero();
@@ -73,9 +73,7 @@ TEST(MotionComposition, CovarianceIsThatOfDrawnErrors) {
     Vector6d n;
     for (double& x : n) x = random.normal();
     const NavigationState truth = add_error(before.state, root * e);
-    const Vector6d lasting =
-        errors.drift * (truth.vision_drift + truth.vision_constant) + errors.by_calibration * truth.calibration;
-    const Pose end = truth.world_from_vision_clone * measured * exp_se3(lasting + noise_root * n);
+    const Pose end = truth.world_from_vision_clone * measured * exp_se3(lasting_error(truth, errors) + noise_root * n);
     const Vector6d error = log_se3(composed.state.world_from_body.inverse() * end);
     scatter += error * error.transpose() / kTrials;
   }

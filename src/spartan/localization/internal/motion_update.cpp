@@ -160,7 +160,7 @@ bool ErrorStateFilter::doubt_motion(const VisualMotion& visual, const Innovation
 /// independent of it, and after a stop it would be certain of a speed of zero.
 void ErrorStateFilter::follow_vision(const VisualMotion& visual, const Matrix6d& covariance) {
   StateEstimate& e = memory_.estimate;
-  compose_motion(e, error_at::kVisionClone, visual.motion.previous_from_current, covariance, visual.errors);
+  compose_motion(e, visual.motion.previous_from_current, covariance, visual.errors);
   const Pose motion = motion_since_clone(e.state, error_at::kVisionClone).clone_from_body;
   memory_.world_from_odom = e.state.world_from_body * (memory_.vision.odom_from_clone * motion).inverse();
   // The end of a random walk of the velocity whose integral is known has a quarter of its variance.
@@ -273,10 +273,9 @@ std::optional<ForwardComparison> ErrorStateFilter::compare_forward(const VisualM
   const StepForward predicted = forward_since(s, error_at::kVisionClone, wheel_centre_);
   const double predicted_variance = predicted.jacobian * p * predicted.jacobian.transpose();
   // As in relative_motion_innovation(): white noise, and the errors that last.
-  const Vector6d lasting =
-      visual.errors.drift * (s.vision_drift + s.vision_constant) + visual.errors.by_calibration * s.calibration;
   const Pose to_centre = Pose::from_translation(wheel_centre_);
-  const double seen_m = forward_of(to_centre.inverse() * motion.previous_from_current * exp_se3(lasting) * to_centre);
+  const double seen_m = forward_of(to_centre.inverse() * motion.previous_from_current *
+                                   exp_se3(lasting_error(s, visual.errors)) * to_centre);
   Eigen::Matrix<double, 6, 20> by_lasting;  // z₁, z₂, η
   static_assert(error_at::kVisionConstant == error_at::kVisionDrift + 6 &&
                 error_at::kCalibration == error_at::kVisionDrift + 12);
