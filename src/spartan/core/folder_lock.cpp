@@ -57,6 +57,17 @@ bool has_name(int descriptor, const std::string& path) {
          opened.st_ino == named.st_ino;
 }
 
+// Whether there is more in the folder than a lock file, which may appear at any moment. True as well for a folder that
+// does not exist.
+bool has_content(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::directory_iterator entry(folder, error);
+  for (const std::filesystem::directory_iterator end; !error && entry != end; entry.increment(error)) {
+    if ("/" + entry->path().filename().string() != kLockFile) return true;
+  }
+  return static_cast<bool>(error);
+}
+
 Status write_owner(int descriptor, const std::string& path) {
   const std::string id = std::to_string(::getpid()) + "\n";
   errno = 0;
@@ -71,8 +82,7 @@ Status FolderLock::expect_free(const std::string& folder) {
   const std::string path = folder + kLockFile;
   for (int i = 0; i < kTries; ++i) {
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    std::error_code error;
-    if (descriptor < 0 && !std::filesystem::is_empty(folder, error)) return {};
+    if (descriptor < 0 && has_content(folder)) return {};
     if (descriptor >= 0) {
       const FolderLock opened(descriptor, "");
       // A shared lock is refused by an exclusive one; it ends with `opened`.
