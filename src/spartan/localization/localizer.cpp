@@ -13,7 +13,7 @@ using namespace internal;
 
 namespace {
 
-constexpr std::uint32_t kStateVersion = 7;
+constexpr std::uint32_t kStateVersion = 8;
 
 }  // namespace
 

@@ -66,6 +66,7 @@ enum class HealthReason : std::uint8_t {
   not_aligned,   ///< its readings fit the visual motions with no biases and gravity
   wild,          ///< a single motion far from what IMU or wheels say
   outvoted,      ///< vision contradicts the IMU and the wheels, which agree
+  implausible,   ///< a motion far off what those before it predict, which no sensor confirms
   lost,          ///< vision could not measure the motion
   never_seen,
   silent,

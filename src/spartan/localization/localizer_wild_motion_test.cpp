@@ -69,6 +69,34 @@ TEST(LocalizerWildMotion, OneIsRejectedWithAnyWitness) {
   }
 }
 
+// A compass or an inclinometer do not see it. No rover jumps by 0.5 m between steps of 0.15 m: the motion is used with its
+// size as standard deviation.
+TEST(LocalizerWildMotion, IsUncertainWithoutAWitness) {
+  for (const TestSensors& sensors : {TestSensors{false, false, false, false}, TestSensors{false, false, true, false},
+                                     TestSensors{false, false, false, true}, TestSensors{false, false, true, true}}) {
+    SCOPED_TRACE(::testing::Message() << "compass " << sensors.compass << " inclinometer " << sensors.inclinometer);
+    constexpr int kTrials = 10;
+    for (std::uint64_t seed = 1; seed <= kTrials; ++seed) {
+      const Trial trial = with_wild_motions(sensors, 1, seed);
+      const LocalizationEstimate end = driven(test_options(), trial.all).estimate();
+      EXPECT_LT(position_nees(end, trial.first), kThreeSigma);
+      EXPECT_GT(position_nees(end, trial.first), 1e-3);
+      EXPECT_EQ(end.health_of(LocalizationSensor::vision).rejected, 0);
+      EXPECT_EQ(end.health_of(LocalizationSensor::vision).state, SensorState::ok);
+    }
+  }
+}
+
+TEST(LocalizerWildMotion, WithoutAWitnessItIsSaidInTheHealth) {
+  const Trial trial = with_wild_motions({false, false, false, false}, 1, 3);
+  std::vector<Measurement> until;
+  std::copy_if(trial.all.begin(), trial.all.end(), std::back_inserter(until),
+               [](const Measurement& m) { return stamp_of_measurement(m) <= test_stamp(32.6); });
+  const SensorHealth vision = driven(test_options(), until).estimate().health_of(LocalizationSensor::vision);
+  EXPECT_EQ(vision.state, SensorState::suspect);
+  EXPECT_EQ(vision.reason, "its motion is far off what those before it predict, and no other sensor confirms it");
+}
+
 TEST(LocalizerWildMotion, IsSaidInTheHealth) {
   const Trial trial = with_wild_motions({true, false, false, false}, 1, 3);
   std::vector<Measurement> until;

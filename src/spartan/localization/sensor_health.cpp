@@ -140,6 +140,9 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
       health.reason = fmt::format(
           "contradicts the IMU and the wheels, which agree: NIS {:.1f} above the gate of {:.1f}", nis, limit);
       break;
+    case HealthReason::implausible:
+      health.reason = "its motion is far off what those before it predict, and no other sensor confirms it";
+      break;
     case HealthReason::lost:
       health.reason = "no motion estimate for the last frame";
       break;

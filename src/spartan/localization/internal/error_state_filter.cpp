@@ -48,8 +48,8 @@ ErrorStateFilter::ErrorStateFilter(const LocalizationOptions& options)
   drift_sigma_ratios_ = six_of(options.vision.drift_sigma_ratios);
   constant_sigma_ratios_ = six_of(options.vision.constant_sigma_ratios);
   for (int rows = 1; rows <= 6; ++rows)
-    gates_[static_cast<std::size_t>(rows)] = chi_square_quantile(options.health.gate_probability, rows);
-  vision_gate_ = chi_square_quantile(options.vision.gate_probability, 6);
+    gates_.by_rows[static_cast<std::size_t>(rows)] = chi_square_quantile(options.health.gate_probability, rows);
+  gates_.vision = chi_square_quantile(options.vision.gate_probability, 6);
 }
 
 void ErrorStateFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body, std::span<const Measurement> before,
@@ -218,7 +218,7 @@ void ErrorStateFilter::propagate_biases(double seconds) {
 }
 
 bool ErrorStateFilter::accept(LocalizationSensor sensor, double nis, int rows, HealthReason why) {
-  return memory_.monitor(sensor).accept(nis, gates_[static_cast<std::size_t>(rows)], why,
+  return memory_.monitor(sensor).accept(nis, gates_.by_rows[static_cast<std::size_t>(rows)], why,
                                         options_.health.excluded_after, options_.health.readmit_after);
 }
 

@@ -13,18 +13,12 @@
 #include "spartan/localization/internal/kalman_update.h"
 #include "spartan/localization/internal/lever_arm.h"
 #include "spartan/localization/internal/measurement_models.h"
+#include "spartan/localization/internal/motion_decision.h"
 #include "spartan/localization/internal/propagation.h"
 #include "spartan/localization/localization_options.h"
 #include "spartan/localization/localizer.h"
 
 namespace spartan::internal {
-
-/// Whether IMU, wheels and vision agree on the distance since the last frame.
-struct ForwardComparison {
-  bool imu_and_wheels_agree = false;
-  bool vision_contradicts_imu = false;
-  double vision_nis = 0;  ///< normalized innovation squared of vision against the mean of the IMU and the wheels
-};
 
 /// A visual motion of the IMU, and how the errors that last act on it.
 struct VisualMotion {
@@ -90,16 +84,20 @@ class ErrorStateFilter {
   bool update_by_motion(const VisualMotion& visual);
   void propagate_drift(int index, const Vector6d& sigmas, double steps);
   void inflate_prediction(const Innovation& innovation, const RelativeMotion& motion);
-  bool reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
-  bool accept_vision(double nis, double gate, HealthReason why);
-  bool doubt_motion(const VisualMotion& visual, const Innovation& innovation, double nis);
+  void reset_prediction(const Innovation& innovation, double nis, const RelativeMotion& motion);
+  bool accept_vision(const MotionDecision& decision);
+  void count_agreement_of_imu(bool velocity_was_reset);
   void follow_vision(const VisualMotion& visual, const Matrix6d& covariance);
-  bool is_wild_motion(const VisualMotion& visual, const Innovation& innovation, double inertial_nis) const;
+  void accept_doubted_motion();
+  void begin_frame(Stamp stamp);
+
+  // What other sensors say about a visual motion: motion_evidence.cpp.
+  MotionEvidence evidence_of(const VisualMotion& visual, const Innovation& innovation) const;
+  bool is_implausible(const RelativeMotion& motion, double off_m) const;
+  void remember_speed(const RelativeMotion& motion, bool uncertain);
   std::optional<WheelStep> wheel_step_since_frame(Stamp stamp) const;
   std::optional<double> compare_with_wheels(const VisualMotion& visual) const;
-  void accept_doubted_motion();
   std::optional<ForwardComparison> compare_forward(const VisualMotion& visual) const;
-  void begin_frame(Stamp stamp);
 
   // Wheels and zero-velocity updates: wheel_update.cpp.
   void update(const WheelSample& sample);
@@ -133,8 +131,7 @@ class ErrorStateFilter {
   LeverArm arm_;
   Eigen::Vector3d wheel_centre_;  ///< relative to the IMU
   Vector6d drift_sigma_ratios_, constant_sigma_ratios_;
-  std::array<double, 7> gates_{};  ///< by degrees of freedom
-  double vision_gate_ = 0;
+  MotionGates gates_;
   FilterMemory memory_;
 };
 

@@ -135,6 +135,7 @@ void visit(Each& each, Memory& m) {
   visit_imu(each, m.imu);
   each(m.vision.clone_stamp), each(m.vision.odom_from_clone), each(m.vision.odom_covariance), each(m.vision.stationary);
   each(m.vision.rate_rad_s), each(m.vision.constant_velocity_noise), each(m.vision.constant_velocity_s);
+  each(m.vision.recent_speed_m_s), each(m.vision.moving_motions), each(m.vision.moving_at);
   each(m.vision.reset), each(m.vision.doubted), each(m.vision.doubted_at), each(m.vision.doubted_pose);
   each(m.vision.has_wheels), visit_wheels(each, m.vision.wheels), each(m.vision.wheels_in_prediction);
   each(m.step.from), each(m.step.odom_from_clone), each(m.step.has_wheels), visit_wheels(each, m.step.wheels);

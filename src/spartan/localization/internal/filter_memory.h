@@ -51,6 +51,9 @@ struct VisionMemory {
   Matrix9d constant_velocity_noise = Matrix9d::Zero();
   double constant_velocity_s = 0;
   bool reset = false;  ///< the last motion contradicted the IMU, so that the velocity is uncertain
+  double recent_speed_m_s = 0;  ///< the highest of the last motions; fades
+  std::uint32_t moving_motions = 0;       ///< that it is known from, as far as they matter
+  Stamp moving_at;              ///< end of the last one
   /// The last motion was rejected as wild; by it, world_from_imu at `doubted_at` would be `doubted_pose`.
   bool doubted = false;
   Stamp doubted_at;

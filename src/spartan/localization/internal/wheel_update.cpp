@@ -89,7 +89,7 @@ void ErrorStateFilter::update_by_step(const WheelSample& sample) {
   forward.jacobian = whole.jacobian.topRows<1>();
   forward.noise(0, 0) = whole.noise(0, 0);
   const double length_nis = normalized_innovation_squared(memory_.estimate.covariance, forward);
-  const bool slips = !(length_nis <= gates_[1]);
+  const bool slips = !(length_nis <= gates_.by_rows[1]);
   const double nis = slips ? length_nis : normalized_innovation_squared(memory_.estimate.covariance, whole);
   const int rows = slips ? 1 : whole.rows();
   if (accept(LocalizationSensor::wheels, nis, rows, slips ? HealthReason::slips : HealthReason::disagrees)) {
@@ -168,7 +168,7 @@ void ErrorStateFilter::update_zero_velocity(bool imu_stationary) {
   covariance.diagonal().tail<3>().setConstant(std::pow(options_.zero_velocity.attitude_sigma_rad, 2));
   const Innovation innovation =
       relative_motion_innovation(memory_.estimate.state, error_at::kStepClone, Pose(), covariance, {});
-  if (normalized_innovation_squared(memory_.estimate.covariance, innovation) > gates_[6]) {
+  if (normalized_innovation_squared(memory_.estimate.covariance, innovation) > gates_.by_rows[6]) {
     begin_step(wheels_at(memory_.stamp));
     return;
   }
