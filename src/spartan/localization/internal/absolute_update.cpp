@@ -67,10 +67,15 @@ void ErrorStateFilter::initialize_compass_offset(const CompassSample& sample, do
   ++memory_.monitor(LocalizationSensor::compass).used;
 }
 
+double ErrorStateFilter::inclinometer_sigma(const InclinometerSample& sample) const {
+  return options_.inclinometer.noise_factor * std::max(sample.sigma_rad, options_.inclinometer.min_sigma_rad);
+}
+
 void ErrorStateFilter::update(const InclinometerSample& sample) {
   advance_to(sample.stamp);
-  const double sigma =
-      options_.inclinometer.noise_factor * std::max(sample.sigma_rad, options_.inclinometer.min_sigma_rad);
+  memory_.inclinometer.known = true;
+  memory_.inclinometer.last = sample;
+  const double sigma = inclinometer_sigma(sample);
   NavigationState& s = memory_.estimate.state;
   if (!memory_.gravity_known) {
     const Eigen::Vector3d up = s.world_from_body.rotation() * up_of_roll_pitch(sample.roll_rad, sample.pitch_rad);

@@ -93,8 +93,10 @@ class ErrorStateFilter {
 
   // What other sensors say about a visual motion: motion_evidence.cpp.
   MotionEvidence evidence_of(const VisualMotion& visual, const Innovation& innovation) const;
-  bool is_implausible(const RelativeMotion& motion, double off_m) const;
-  void remember_speed(const RelativeMotion& motion, bool uncertain);
+  bool is_implausible(const RelativeMotion& motion) const;
+  void remember_motion(const RelativeMotion& motion, bool uncertain);
+  std::optional<InclinometerSample> tilt_at(Stamp stamp) const;
+  std::optional<double> compare_with_inclinometer(const VisualMotion& visual) const;
   std::optional<WheelStep> wheel_step_since_frame(Stamp stamp) const;
   std::optional<double> compare_with_wheels(const VisualMotion& visual) const;
   std::optional<ForwardComparison> compare_forward(const VisualMotion& visual) const;
@@ -115,6 +117,7 @@ class ErrorStateFilter {
   void update(const CompassSample& sample);
   void initialize_compass_offset(const CompassSample& sample, double sigma_rad);
   void update(const InclinometerSample& sample);
+  double inclinometer_sigma(const InclinometerSample& sample) const;
   void inflate_attitude(const Innovation& innovation);
   void update(const PoseConstraint& constraint);
   void update(const LateConstraint& constraint);

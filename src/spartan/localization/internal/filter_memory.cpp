@@ -121,6 +121,11 @@ void visit_imu(Each& each, Imu& m) {
   each(m.block.gyro_squares), each(m.block.accel_squares);
 }
 
+template <class Each, class Sample>
+void visit_tilt(Each& each, Sample& s) {
+  each(s.stamp), each(s.roll_rad), each(s.pitch_rad), each(s.sigma_rad);
+}
+
 template <class Each, class Monitor>
 void visit_monitor(Each& each, Monitor& j) {
   each(j.seen), each(j.last), each(j.state), each(j.reason), each(j.nis), each(j.limit);
@@ -135,9 +140,11 @@ void visit(Each& each, Memory& m) {
   visit_imu(each, m.imu);
   each(m.vision.clone_stamp), each(m.vision.odom_from_clone), each(m.vision.odom_covariance), each(m.vision.stationary);
   each(m.vision.rate_rad_s), each(m.vision.constant_velocity_noise), each(m.vision.constant_velocity_s);
-  each(m.vision.recent_speed_m_s), each(m.vision.moving_motions), each(m.vision.moving_at);
+  each(m.vision.recent.count), each(m.vision.recent.length_m), each(m.vision.recent.velocity_m_s),
+      each(m.vision.recent.end);
   each(m.vision.reset), each(m.vision.doubted), each(m.vision.doubted_at), each(m.vision.doubted_pose);
   each(m.vision.has_wheels), visit_wheels(each, m.vision.wheels), each(m.vision.wheels_in_prediction);
+  each(m.vision.has_tilt), visit_tilt(each, m.vision.tilt);
   each(m.step.from), each(m.step.odom_from_clone), each(m.step.has_wheels), visit_wheels(each, m.step.wheels);
   each(m.step.stationary);
   each(m.wheels.known), visit_wheels(each, m.wheels.last), visit_wheels(each, m.wheels.previous),
@@ -146,6 +153,7 @@ void visit(Each& each, Memory& m) {
   each(m.compass.heading_east), each(m.compass.offset_known), each(m.compass.pending);
   for (auto& offset : m.compass.offsets) each(offset);
   for (auto& sigma : m.compass.sigmas) each(sigma);
+  each(m.inclinometer.known), visit_tilt(each, m.inclinometer.last);
   for (auto& monitor : m.monitors) visit_monitor(each, monitor);
 }
 

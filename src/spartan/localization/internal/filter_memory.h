@@ -40,6 +40,14 @@ struct InertialMemory {
   StationaryBlock block;
 };
 
+/// The visual motions that were used last, but for those of a stationary rover.
+struct RecentMotion {
+  std::uint32_t count = 0;  ///< as far as it matters
+  double length_m = 0;      ///< of the longest; fades
+  Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();  ///< of the last one, in the frame where it ended
+  Stamp end;                                               ///< of the last one
+};
+
 /// Since the last frame.
 struct VisionMemory {
   Stamp clone_stamp;
@@ -51,15 +59,15 @@ struct VisionMemory {
   Matrix9d constant_velocity_noise = Matrix9d::Zero();
   double constant_velocity_s = 0;
   bool reset = false;  ///< the last motion contradicted the IMU, so that the velocity is uncertain
-  double recent_speed_m_s = 0;  ///< the highest of the last motions; fades
-  std::uint32_t moving_motions = 0;       ///< that it is known from, as far as they matter
-  Stamp moving_at;              ///< end of the last one
+  RecentMotion recent;
   /// The last motion was rejected as wild; by it, world_from_imu at `doubted_at` would be `doubted_pose`.
   bool doubted = false;
   Stamp doubted_at;
   Pose doubted_pose;
   bool has_wheels = false;
   WheelSample wheels;                 ///< at clone_stamp
+  bool has_tilt = false;
+  InclinometerSample tilt;            ///< the last one before clone_stamp, if it is fresh
   bool wheels_in_prediction = false;  ///< a step of the wheels since clone_stamp has corrected the motion
 };
 
@@ -79,6 +87,11 @@ struct WheelMemory {
   bool slip_known = false;
   Stamp slip_stamp;
   double slip = 0, slip_sigma = 0;
+};
+
+struct InclinometerMemory {
+  bool known = false;
+  InclinometerSample last;
 };
 
 struct CompassMemory {
@@ -101,6 +114,7 @@ struct FilterMemory {
   StepMemory step;
   WheelMemory wheels;
   CompassMemory compass;
+  InclinometerMemory inclinometer;
   std::array<SensorMonitor, kLocalizationSensors> monitors;
 
   SensorMonitor& monitor(LocalizationSensor sensor) { return monitors[static_cast<std::size_t>(sensor)]; }

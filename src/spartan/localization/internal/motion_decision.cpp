@@ -23,6 +23,9 @@ bool is_wild(const MotionEvidence& e, const MotionGates& gates) {
   if (wheels_ok && e.against_wheels && *e.against_wheels > kWildFactor * gates.by_rows[4]) return true;
   if (e.predicted_by_imu)
     return e.imu == SensorState::ok && e.nis > kWildFactor * gates.vision && !wheels_confirm(e, gates);
+  if (e.inclinometer == SensorState::ok && e.against_inclinometer &&
+      *e.against_inclinometer > kWildFactor * gates.by_rows[2])
+    return true;
   return wheels_ok && e.against_prediction_by_wheels &&
          *e.against_prediction_by_wheels > kWildFactor * gates.by_rows[3];
 }

@@ -18,11 +18,14 @@ struct ForwardComparison {
 /// What is known about a visual motion before it is used.
 struct MotionEvidence {
   SensorState vision = SensorState::ok, imu = SensorState::ok, wheels = SensorState::ok;
+  SensorState inclinometer = SensorState::ok;
   bool predicted_by_imu = false;         ///< over the whole motion
   double nis = 0;                        ///< against the prediction by the IMU, 6 degrees of freedom; 0 without it
   std::optional<double> against_wheels;  ///< NIS against their count since the last frame, 4 degrees of freedom
   /// NIS of the translation against a prediction without the IMU that contains the wheels, 3 degrees of freedom.
   std::optional<double> against_prediction_by_wheels;
+  /// NIS of the rotation against two readings, 2 degrees of freedom; without a prediction by the IMU.
+  std::optional<double> against_inclinometer;
   std::optional<ForwardComparison> forward;  ///< where IMU and wheels can tell the distance
   bool follows_doubted = false;              ///< the motion before was rejected as wild, and ended where this one begins
   bool keeps_reference = false;              ///< the next motion begins where this one does, and contains it
@@ -65,7 +68,8 @@ struct MotionGates {
 /// | outside | reset |
 ///
 /// Witnesses of a wild motion: the count of the wheels; the prediction by the IMU, unless the wheels agree with the
-/// motion; without an IMU, the distance predicted with the wheels, if their count alone cannot tell. A motion that
+/// motion; without an IMU, the distance predicted with the wheels, if their count alone cannot tell, and the change of
+/// the inclinometer's readings. (A compass is no witness: its outliers are larger than the error of a motion.) A motion that
 /// follows a doubted one and is contradicted, too, proves that the doubted one was right. Vision that is excluded is
 /// never doubted, nor is a motion that the next one contains.
 MotionDecision decide(const MotionEvidence& evidence, const MotionGates& gates);

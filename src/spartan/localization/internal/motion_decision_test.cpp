@@ -107,6 +107,17 @@ TEST(MotionDecision, WheelsInThePredictionAreAWitnessWithoutAnImu) {
   EXPECT_EQ(use_of(e), MotionUse::follow);
 }
 
+TEST(MotionDecision, AnInclinometerThatIsOkIsAWitnessWithoutAnImu) {
+  MotionEvidence e;
+  e.against_inclinometer = 21;
+  EXPECT_EQ(use_of(e), MotionUse::doubt);
+  e.against_inclinometer = 19;
+  EXPECT_EQ(use_of(e), MotionUse::follow);
+  e.against_inclinometer = 21;
+  e.inclinometer = SensorState::suspect;
+  EXPECT_EQ(use_of(e), MotionUse::follow);
+}
+
 TEST(MotionDecision, OutvotedOnlyByTwoThatAgreeAndBothDiffer) {
   const auto with = [](bool agree, bool contradicts, double nis) {
     MotionEvidence e = by_imu(1);

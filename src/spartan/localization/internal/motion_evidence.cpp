@@ -13,11 +13,13 @@ namespace {
 /// The IMU and the wheels agree where they differ by fewer standard deviations, and vision contradicts the IMU where it
 /// differs by more.
 constexpr double kAgreeSigmas = 3;
-/// A motion is implausible where it differs from the prediction with constant velocity by more than this multiple of the
-/// way at the recent speed (a reversal: twice the way) and this length. The speed fades by kSpeedFades with each motion;
-/// it is known after kSpeedMotions.
-constexpr double kImplausibleFactor = 2, kImplausible_m = 0.1, kSpeedFades = 0.9;
-constexpr std::uint32_t kSpeedMotions = 3;
+/// A motion is implausible where it differs from all that a speed between zero and the last one can explain by more than
+/// this multiple of the recent length (a reversal: twice) and this length. The length fades by kLengthFades with each
+/// motion; it is known after kRecentMotions.
+constexpr double kImplausibleFactor = 2, kImplausible_m = 0.1, kLengthFades = 0.9;
+constexpr std::uint32_t kRecentMotions = 3;
+/// Maximum age of a reading of the inclinometer at a frame; angular rate of a rocking rover in the time between.
+constexpr double kFreshTilt_s = 0.5, kRocking_rad_s = 0.03;
 
 double translation_nis(const ErrorCovariance& covariance, const Innovation& innovation) {
   Innovation shift(3);
@@ -36,38 +38,74 @@ MotionEvidence ErrorStateFilter::evidence_of(const VisualMotion& visual, const I
   e.vision = memory_.monitor(LocalizationSensor::vision).state;
   e.imu = memory_.monitor(LocalizationSensor::imu).state;
   e.wheels = memory_.monitor(LocalizationSensor::wheels).state;
+  e.inclinometer = memory_.monitor(LocalizationSensor::inclinometer).state;
   e.predicted_by_imu = vision.constant_velocity_s == 0;
   e.against_wheels = compare_with_wheels(visual);
   if (e.predicted_by_imu) {
     e.nis = normalized_innovation_squared(memory_.estimate.covariance, innovation);
     e.forward = compare_forward(visual);
-  } else if (vision.wheels_in_prediction && e.against_wheels) {
-    e.against_prediction_by_wheels = translation_nis(memory_.estimate.covariance, innovation);
+  } else {
+    e.against_inclinometer = compare_with_inclinometer(visual);
+    if (vision.wheels_in_prediction && e.against_wheels)
+      e.against_prediction_by_wheels = translation_nis(memory_.estimate.covariance, innovation);
   }
   e.follows_doubted = vision.doubted && vision.doubted_at == motion.from;
   e.keeps_reference = motion.keeps_reference;
-  e.is_implausible = is_implausible(motion, innovation.residual.head<3>().norm());
+  e.is_implausible = is_implausible(motion);
   return e;
 }
 
-/// `off_m`: its distance from the prediction. While the cameras stand, or show the same frame, the way goes on growing.
-bool ErrorStateFilter::is_implausible(const RelativeMotion& motion, double off_m) const {
-  const VisionMemory& vision = memory_.vision;
-  if (vision.moving_motions < kSpeedMotions || motion.is_stationary()) return false;
-  const double seconds = seconds_between(std::min(vision.moving_at, motion.from), motion.to);
-  return off_m > kImplausibleFactor * vision.recent_speed_m_s * seconds + kImplausible_m;
+/// While the cameras stand, or show the same frame, the rover may have moved on.
+bool ErrorStateFilter::is_implausible(const RelativeMotion& motion) const {
+  const RecentMotion& recent = memory_.vision.recent;
+  if (recent.count < kRecentMotions || motion.is_stationary()) return false;
+  const double seconds = seconds_between(std::min(recent.end, motion.from), motion.to);
+  const Eigen::Vector3d way = recent.velocity_m_s * seconds, moved = motion.previous_from_current.translation();
+  const double part = std::clamp(moved.dot(way) / std::max(way.squaredNorm(), 1e-12), 0.0, 1.0);
+  return (moved - part * way).norm() > kImplausibleFactor * recent.length_m + kImplausible_m;
 }
 
-/// Of a motion that was used. The speed of an uncertain one counts as far as it was plausible.
-void ErrorStateFilter::remember_speed(const RelativeMotion& motion, bool uncertain) {
+/// Of a motion that was used. The length of an uncertain one counts as far as it was plausible.
+void ErrorStateFilter::remember_motion(const RelativeMotion& motion, bool uncertain) {
   if (motion.is_stationary()) return;
-  VisionMemory& vision = memory_.vision;
-  const double seconds = std::max(seconds_between(motion.from, motion.to), 1e-3);
-  double speed = motion.previous_from_current.translation().norm() / seconds;
-  if (uncertain) speed = std::min(speed, kImplausibleFactor * vision.recent_speed_m_s + kImplausible_m / seconds);
-  vision.recent_speed_m_s = std::max(kSpeedFades * vision.recent_speed_m_s, speed);
-  vision.moving_motions = std::min(vision.moving_motions + 1, kSpeedMotions);
-  vision.moving_at = motion.to;
+  RecentMotion& recent = memory_.vision.recent;
+  const Pose& moved = motion.previous_from_current;
+  double length = moved.translation().norm();
+  if (uncertain) length = std::min(length, kImplausibleFactor * recent.length_m + kImplausible_m);
+  recent.length_m = std::max(kLengthFades * recent.length_m, length);
+  recent.count = std::min(recent.count + 1, kRecentMotions);
+  recent.velocity_m_s = length / std::max(seconds_between(motion.from, motion.to), 1e-3) *
+                        (moved.rotation().conjugate() * moved.translation().stableNormalized());
+  recent.end = motion.to;
+}
+
+/// The last reading before a frame.
+std::optional<InclinometerSample> ErrorStateFilter::tilt_at(Stamp stamp) const {
+  const InclinometerMemory& tilt = memory_.inclinometer;
+  if (!tilt.known || seconds_between(tilt.last.stamp, stamp) > kFreshTilt_s) return std::nullopt;
+  return tilt.last;
+}
+
+/// NIS of the direction of up at the end of the visual motion against the readings at both ends; their bias cancels.
+std::optional<double> ErrorStateFilter::compare_with_inclinometer(const VisualMotion& visual) const {
+  const RelativeMotion& motion = visual.motion;
+  const std::optional<InclinometerSample> now = tilt_at(motion.to);
+  if (!now || !memory_.vision.has_tilt) return std::nullopt;
+  const InclinometerSample& before = memory_.vision.tilt;
+  const Eigen::Matrix3d rotation = motion.previous_from_current.rotation().toRotationMatrix();
+  const Eigen::Vector3d measured = up_of_roll_pitch(now->roll_rad, now->pitch_rad),
+                        seen = rotation.transpose() * up_of_roll_pitch(before.roll_rad, before.pitch_rad);
+  const double age = seconds_between(before.stamp, motion.from) + seconds_between(now->stamp, motion.to);
+  const double variance = std::pow(inclinometer_sigma(before), 2) + std::pow(inclinometer_sigma(*now), 2) +
+                          std::pow(kRocking_rad_s * age, 2);
+  const Eigen::Vector3d side = seen.unitOrthogonal();
+  Eigen::Matrix<double, 2, 3> directions;
+  directions << side.transpose(), seen.cross(side).transpose();
+  const Eigen::Matrix<double, 2, 3> by_rotation = directions * skew(seen);
+  const Eigen::Matrix2d covariance = by_rotation * motion.covariance.bottomRightCorner<3, 3>() * by_rotation.transpose() +
+                                     variance * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d residual = directions * (measured - seen);
+  return residual.dot(covariance.ldlt().solve(residual));
 }
 
 /// The step of the wheels since the last frame. None if they cannot tell.

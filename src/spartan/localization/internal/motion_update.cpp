@@ -107,18 +107,18 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
     case MotionUse::reject:
       return false;
     case MotionUse::reset:
-      remember_speed(motion, false);
+      remember_motion(motion, false);
       reset_prediction(innovation, evidence.nis, motion);
       return true;
     case MotionUse::follow:
       if (!accepted) return false;
-      remember_speed(motion, decision.uncertain);
+      remember_motion(motion, decision.uncertain);
       if (decision.uncertain) covariance += size_as_variance(motion.previous_from_current);
       follow_vision(visual, covariance);
       return true;
     case MotionUse::correct:
       if (!accepted) return false;
-      remember_speed(motion, false);
+      remember_motion(motion, false);
       count_agreement_of_imu(velocity_was_reset);
       correct_motion(innovation, error_at::kVisionClone);
       return true;
@@ -216,6 +216,9 @@ void ErrorStateFilter::begin_frame(Stamp stamp) {
   const std::optional<WheelSample> wheels = wheels_at(stamp);
   memory_.vision.has_wheels = wheels.has_value();
   if (wheels) memory_.vision.wheels = *wheels;
+  const std::optional<InclinometerSample> tilt = tilt_at(stamp);
+  memory_.vision.has_tilt = tilt.has_value();
+  if (tilt) memory_.vision.tilt = *tilt;
   memory_.vision.wheels_in_prediction = false;
   memory_.vision.constant_velocity_noise.setZero();
   memory_.vision.constant_velocity_s = 0;
