@@ -261,6 +261,41 @@ class Localizer {
   std::unique_ptr<State> state_;
 };
 
+/// How a Localizer was started.
+struct LocalizationStart {
+  Stamp stamp;
+  Eigen::Vector3d ahead_in_body = Eigen::Vector3d::UnitX();
+  std::optional<Eigen::Vector3d> up_in_body;
+  Eigen::Vector3d assumed_up_in_body = Eigen::Vector3d::UnitZ();
+};
+
+struct SmoothedPose {
+  Stamp stamp;
+  UncertainPose world_from_body;
+};
+
+/// The poses of a drive at its frames by all its measurements, those after each frame included: a fixed-interval
+/// smoother (Rauch, Tung & Striebel, 1965) over the filter of Localizer. Everything is kept in memory: about 1 kB for a
+/// visual motion, 60 B for a sample of the IMU.
+class Smoother {
+ public:
+  /// Code `configuration` where an option is out of bounds.
+  static Result<Smoother> create(const LocalizationOptions& options);
+  Smoother(Smoother&&) noexcept;
+  Smoother& operator=(Smoother&&) noexcept;
+  ~Smoother();
+
+  /// A measurement that Localizer::add accepted, in any order.
+  void add(const Measurement& measurement);
+  /// At the start and at every visual motion after it, in order of time.
+  std::vector<SmoothedPose> smooth(const LocalizationStart& start) const;
+
+ private:
+  struct State;
+  explicit Smoother(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
 /// A Localizer without any other sensor, in the world of one with all sensors. Without constraints its pose is the
 /// product of the visual motions; its covariance accumulates theirs and the drift (docs/math/localization.md,
 /// "Vision").

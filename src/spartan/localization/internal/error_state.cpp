@@ -69,6 +69,10 @@ void clone_pose(StateEstimate& estimate, int index) {
   ErrorCovariance& p = estimate.covariance;
   p.middleRows<6>(index) = p.middleRows<6>(error_at::kPose).eval();
   p.middleCols<6>(index) = p.middleCols<6>(error_at::kPose).eval();
+  if (estimate.past) {
+    ErrorCovariance& x = estimate.past->with_present;
+    x.middleCols<6>(index) = x.middleCols<6>(error_at::kPose).eval();
+  }
 }
 
 }  // namespace spartan::internal

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "spartan/core/pose.h"
 
@@ -60,10 +61,18 @@ struct NavigationState {
   Pose world_from_vision_clone, world_from_step_clone;
 };
 
+/// What later measurements say about the error at an earlier time (past_state.h).
+struct PastState {
+  ErrorVector mean = ErrorVector::Zero();                     ///< of the error at the earlier time
+  ErrorCovariance covariance = ErrorCovariance::Zero();       ///< of the error at the earlier time
+  ErrorCovariance with_present = ErrorCovariance::Zero();     ///< E[past error · present errorᵀ]
+};
+
 /// Mean and covariance of the error.
 struct StateEstimate {
   NavigationState state;
   ErrorCovariance covariance = ErrorCovariance::Zero();
+  std::optional<PastState> past{};  ///< tracked where a smoother needs it
 };
 
 NavigationState add_error(const NavigationState& state, const ErrorVector& error);

@@ -180,7 +180,7 @@ void ErrorStateFilter::propagate_to(Stamp stamp, const ImuSample* next) {
 void ErrorStateFilter::propagate_inertially(double seconds, const ImuSample& from, const ImuSample& to) {
   const InertialStep step{from.gyro_rad_s, to.gyro_rad_s, from.accel_m_s2, to.accel_m_s2, seconds};
   const InertialNoise noise = inertial_noise(options_.imu, memory_.imu.noise);
-  propagate_covariance(memory_.estimate.covariance,
+  propagate_covariance(memory_.estimate,
                        transition(memory_.estimate.state, step, noise, options_.gravity_m_s2));
   memory_.estimate.state = propagate(memory_.estimate.state, step, options_.gravity_m_s2);
 }
@@ -200,7 +200,7 @@ void ErrorStateFilter::propagate_at_constant_velocity(double seconds) {
   vision.constant_velocity_noise =
       (by * vision.constant_velocity_noise * by.transpose()).eval() + t.noise.topLeftCorner<9, 9>();
   vision.constant_velocity_s += seconds;
-  propagate_covariance(memory_.estimate.covariance, t);
+  propagate_covariance(memory_.estimate, t);
   memory_.estimate.state = propagate(memory_.estimate.state, step);
 }
 
@@ -251,8 +251,7 @@ void ErrorStateFilter::correct_motion(const Innovation& innovation, int clone) {
   memory_.world_from_odom = s.world_from_body * odom_from_body.inverse();
 }
 
-UncertainPose ErrorStateFilter::world_from_body() const {
-  const StateEstimate& e = memory_.estimate;
+UncertainPose ErrorStateFilter::body_pose(const StateEstimate& e) const {
   return arm_.body_pose({e.state.world_from_body, e.covariance.block<6, 6>(error_at::kPose, error_at::kPose)});
 }
 

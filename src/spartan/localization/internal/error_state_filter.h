@@ -14,6 +14,7 @@
 #include "spartan/localization/internal/lever_arm.h"
 #include "spartan/localization/internal/measurement_models.h"
 #include "spartan/localization/internal/motion_decision.h"
+#include "spartan/localization/internal/past_state.h"
 #include "spartan/localization/internal/propagation.h"
 #include "spartan/localization/localization_options.h"
 #include "spartan/localization/localizer.h"
@@ -49,7 +50,12 @@ class ErrorStateFilter {
   const FilterMemory& memory() const { return memory_; }
   void set_memory(const FilterMemory& memory) { memory_ = memory; }
 
-  UncertainPose world_from_body() const;
+  /// From now on the state of this time is kept up beside the present one (memory().estimate.past).
+  void begin_past() { internal::begin_past(memory_.estimate); }
+
+  UncertainPose world_from_body() const { return body_pose(memory_.estimate); }
+  /// world_from_body of an estimate of this filter.
+  UncertainPose body_pose(const StateEstimate& estimate) const;
   /// With the covariance accumulated since the start.
   UncertainPose odom_from_body() const;
   /// Of the body's origin, world.

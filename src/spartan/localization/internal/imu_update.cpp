@@ -174,6 +174,7 @@ void ErrorStateFilter::align(const InertialAlignment& a) {
   selection(9, 12) = 1;
   p(at, Eigen::all).setZero();
   p(Eigen::all, at).setZero();
+  if (memory_.estimate.past) memory_.estimate.past->with_present(Eigen::all, at).setZero();
   p(at, at) = selection * a.covariance * selection.transpose();
 
   const Eigen::Vector3d side = a.up.unitOrthogonal();

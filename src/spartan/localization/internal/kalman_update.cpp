@@ -4,6 +4,8 @@
 #include <limits>
 #include <optional>
 
+#include "spartan/localization/internal/past_state.h"
+
 namespace spartan::internal {
 namespace {
 
@@ -26,11 +28,13 @@ Projection project(const ErrorCovariance& p, const Innovation& innovation) {
   return {pht, s.llt()};
 }
 
-// Transports the error of a pose to its mean after the correction `step`.
-void transport(ErrorCovariance& p, const ErrorVector& step, int index) {
-  const Matrix6d reset = right_jacobian_se3(step.segment<6>(index));
-  p.middleRows<6>(index) = (reset * p.middleRows<6>(index)).eval();
+// Transports the error of a pose to its mean after a correction, by J_r of its step.
+void transport_columns(ErrorCovariance& p, const Matrix6d& reset, int index) {
   p.middleCols<6>(index) = (p.middleCols<6>(index) * reset.transpose()).eval();
+}
+void transport(ErrorCovariance& p, const Matrix6d& reset, int index) {
+  p.middleRows<6>(index) = (reset * p.middleRows<6>(index)).eval();
+  transport_columns(p, reset, index);
 }
 
 std::optional<Gain> kalman_gain(const ErrorCovariance& p, const Innovation& innovation) {
@@ -44,6 +48,7 @@ bool correct_by(StateEstimate& estimate, const Innovation& innovation, const Gai
   if (!step.allFinite()) return false;
   ErrorCovariance keep = ErrorCovariance::Identity();
   keep.noalias() -= gain * innovation.jacobian;
+  if (estimate.past) correct_past(*estimate.past, {innovation, estimate.covariance, gain, keep});
   ErrorCovariance half;
   half.noalias() = keep * estimate.covariance;
   estimate.covariance.noalias() = half * keep.transpose();
@@ -52,8 +57,11 @@ bool correct_by(StateEstimate& estimate, const Innovation& innovation, const Gai
     half.noalias() = keep * innovation.shared * gain.transpose();
     estimate.covariance -= half + half.transpose();
   }
-  for (const int pose : {error_at::kPose, error_at::kVisionClone, error_at::kStepClone})
-    transport(estimate.covariance, step, pose);
+  for (const int pose : {error_at::kPose, error_at::kVisionClone, error_at::kStepClone}) {
+    const Matrix6d reset = right_jacobian_se3(step.segment<6>(pose));
+    transport(estimate.covariance, reset, pose);
+    if (estimate.past) transport_columns(estimate.past->with_present, reset, pose);
+  }
   symmetrize(estimate.covariance);
   estimate.state = add_error(estimate.state, step);
   return true;

@@ -21,6 +21,10 @@ void compose_motion(StateEstimate& estimate, const Pose& measured, const Matrix6
   rows.middleCols<6>(error_at::kPose) = 0.5 * (own + own.transpose());
   p.middleRows<6>(error_at::kPose) = rows;
   p.middleCols<6>(error_at::kPose) = rows.transpose();
+  if (estimate.past) {
+    ErrorCovariance& x = estimate.past->with_present;
+    x.middleCols<6>(error_at::kPose) = (x * by.transpose()).eval();
+  }
 }
 
 // p' = p + ½ (R + R') w t, and to second order in the rotation vector φ of the motion: ½ (I + Exp φ) = Exp(½ φ).
@@ -31,6 +35,7 @@ void set_velocity(StateEstimate& estimate, const Pose& motion, double seconds, d
   p.middleRows<3>(error_at::kVelocity).setZero();
   p.middleCols<3>(error_at::kVelocity).setZero();
   p.diagonal().segment<3>(error_at::kVelocity).setConstant(variance);
+  if (estimate.past) estimate.past->with_present.middleCols<3>(error_at::kVelocity).setZero();
 }
 
 }  // namespace spartan::internal

@@ -168,6 +168,7 @@ void ErrorStateFilter::propagate_drift(int index, const Vector6d& sigmas, double
   (index == error_at::kVisionDrift ? s.vision_drift : s.vision_constant) *= stays;
   p.middleRows<6>(index) *= stays;
   p.middleCols<6>(index) *= stays;
+  if (memory_.estimate.past) memory_.estimate.past->with_present.middleCols<6>(index) *= stays;
   p.diagonal().segment<6>(index) += (1 - stays * stays) * sigmas.cwiseAbs2();
 }
 

@@ -141,4 +141,13 @@ void propagate_covariance(ErrorCovariance& p, const Transition& t) {
   p.bottomLeftCorner<kRest, error_at::kMoving>() = rows.rightCols<kRest>().transpose();
 }
 
+void propagate_covariance(StateEstimate& estimate, const Transition& t) {
+  propagate_covariance(estimate.covariance, t);
+  if (!estimate.past) return;
+  ErrorCovariance& x = estimate.past->with_present;
+  x.leftCols<error_at::kMoving>() = (x.leftCols<error_at::kMoving>() * t.by_moving.transpose() +
+                                     x.middleCols<4>(error_at::kGravityTilt) * t.by_constants.transpose())
+                                        .eval();
+}
+
 }  // namespace spartan::internal

@@ -50,5 +50,7 @@ Transition transition(const NavigationState& state, const ConstantVelocityStep& 
 
 /// P → F P Fᵀ + Q on the rows and columns that change.
 void propagate_covariance(ErrorCovariance& p, const Transition& t);
+/// The same, and what the present has in common with a past state.
+void propagate_covariance(StateEstimate& estimate, const Transition& t);
 
 }  // namespace spartan::internal

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "spartan/localization/internal/measurement_archive.h"
+
 namespace spartan::internal {
 namespace {
 
@@ -23,104 +25,10 @@ double age(const Measurement& m, Stamp newest) {
   return seconds_between(stamp_of_measurement(m), newest);
 }
 
-void put_constraint(ArchiveWriter& out, const PoseConstraint& c) {
-  out.put(c.world_from_body);
-  out.put(c.information);
-  out.put(c.map_covariance);
-}
-
-PoseConstraint get_constraint(ArchiveReader& in, Stamp stamp) {
-  const Pose pose = in.get_pose();
-  const Matrix6d information = in.get_matrix6();
-  return {stamp, pose, information, in.get_matrix6()};
-}
-
-// The index of the kind in the variant, then the fields.
-void put_measurement(ArchiveWriter& out, const Measurement& m) {
-  out.put(static_cast<std::uint8_t>(m.index()));
-  out.put(stamp_of_measurement(m).ns);
-  if (const auto* imu = std::get_if<ImuSample>(&m)) {
-    out.put(imu->gyro_rad_s);
-    out.put(imu->accel_m_s2);
-  } else if (const auto* motion = std::get_if<RelativeMotion>(&m)) {
-    out.put(motion->from.ns);
-    out.put(motion->previous_from_current);
-    out.put(motion->covariance);
-    out.put(motion->measured);
-    out.put(motion->keeps_reference);
-    out.put(motion->lasting_sigma.has_value());
-    if (motion->lasting_sigma) {
-      for (const double sigma : *motion->lasting_sigma) out.put(sigma);
-    }
-    for (Eigen::Index i = 0; i < motion->by_calibration.size(); ++i) out.put(motion->by_calibration.data()[i]);
-  } else if (const auto* wheels = std::get_if<WheelSample>(&m)) {
-    out.put(wheels->left_m);
-    out.put(wheels->right_m);
-  } else if (const auto* compass = std::get_if<CompassSample>(&m)) {
-    out.put(compass->heading_rad);
-    out.put(compass->sigma_rad);
-  } else if (const auto* tilt = std::get_if<InclinometerSample>(&m)) {
-    out.put(tilt->roll_rad);
-    out.put(tilt->pitch_rad);
-    out.put(tilt->sigma_rad);
-  } else if (const auto* constraint = std::get_if<PoseConstraint>(&m)) {
-    put_constraint(out, *constraint);
-  } else if (const auto* late = std::get_if<LateConstraint>(&m)) {
-    out.put(late->at_frame.stamp.ns);
-    put_constraint(out, late->at_frame);
-  }
-}
-
-std::optional<Measurement> get_measurement(ArchiveReader& in) {
-  const auto kind = in.get<std::uint8_t>();
-  const Stamp stamp = in.get_stamp();
-  switch (kind) {
-    case 0: {
-      const Eigen::Vector3d gyro = in.get_vector3();
-      return ImuSample{stamp, gyro, in.get_vector3()};
-    }
-    case 1: {
-      RelativeMotion motion;
-      motion.to = stamp;
-      motion.from = in.get_stamp();
-      motion.previous_from_current = in.get_pose();
-      motion.covariance = in.get_matrix6();
-      motion.measured = in.get<bool>();
-      motion.keeps_reference = in.get<bool>();
-      if (in.get<bool>()) {
-        motion.lasting_sigma.emplace();
-        for (double& sigma : *motion.lasting_sigma) sigma = in.get_finite();
-      }
-      for (Eigen::Index i = 0; i < motion.by_calibration.size(); ++i) motion.by_calibration.data()[i] = in.get_finite();
-      return motion;
-    }
-    case 2: {
-      const auto left = in.get<double>();
-      return WheelSample{stamp, left, in.get<double>()};
-    }
-    case 3: {
-      const auto heading = in.get<double>();
-      return CompassSample{stamp, heading, in.get<double>()};
-    }
-    case 4: {
-      const auto roll = in.get<double>(), pitch = in.get<double>();
-      return InclinometerSample{stamp, roll, pitch, in.get<double>()};
-    }
-    case 5:
-      return get_constraint(in, stamp);
-    case 6: {
-      const Stamp frame = in.get_stamp();
-      return LateConstraint{stamp, get_constraint(in, frame)};
-    }
-    default:
-      return std::nullopt;
-  }
-}
-
 }  // namespace
 
 ReplayFilter::ReplayFilter(const LocalizationOptions& options)
-    : options_(options), lead_ns_(std::llround(options.imu.max_time_error_s() * 1e9)), filter_(options) {}
+    : options_(options), order_(options), filter_(options) {}
 
 void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
                          const std::optional<Eigen::Vector3d>& up_in_body, const Eigen::Vector3d& assumed_up_in_body) {
@@ -196,21 +104,10 @@ void ReplayFilter::undo_leap(Stamp arrived) {
   replay_from(std::min(processed_, entries_.size()));
 }
 
-/// When a measurement is processed.
-Stamp ReplayFilter::turn_of(const Measurement& m) const {
-  const Stamp stamp = stamp_of_measurement(m);
-  return std::holds_alternative<ImuSample>(m) ? Stamp{stamp.ns - lead_ns_} : stamp;
-}
-
-bool ReplayFilter::precedes(const Measurement& a, const Measurement& b) const {
-  const Stamp at = turn_of(a), bt = turn_of(b);
-  return at != bt ? at < bt : a.index() < b.index();
-}
-
 std::optional<std::size_t> ReplayFilter::place(const Measurement& m) {
   const auto at = std::lower_bound(entries_.begin(), entries_.end(), m,
-                                   [this](const Measurement& a, const Measurement& b) { return precedes(a, b); });
-  if (at != entries_.end() && !precedes(m, *at)) return std::nullopt;
+                                   [this](const Measurement& a, const Measurement& b) { return order_.precedes(a, b); });
+  if (at != entries_.end() && !order_.precedes(m, *at)) return std::nullopt;
   const auto index = static_cast<std::size_t>(at - entries_.begin());  // insert() invalidates the iterator
   entries_.insert(at, m);
   return index;
@@ -232,7 +129,7 @@ std::optional<Refusal> ReplayFilter::insert(const Measurement& m) {
 
 bool ReplayFilter::opens_cell(std::size_t entry) const {
   if (entry == 0) return false;
-  return cell_of(turn_of(entries_[entry])) != cell_of(turn_of(entries_[entry - 1]));
+  return cell_of(order_.turn_of(entries_[entry])) != cell_of(order_.turn_of(entries_[entry - 1]));
 }
 
 std::optional<ErrorStateFilter> ReplayFilter::at(Stamp stamp) const {
@@ -246,7 +143,7 @@ std::optional<ErrorStateFilter> ReplayFilter::at(Stamp stamp) const {
     filter.set_memory(from.memory);
     first = from.count;
   }
-  for (std::size_t i = first; i < entries_.size() && turn_of(entries_[i]) <= stamp; ++i) filter.process(entries_[i]);
+  for (std::size_t i = first; i < entries_.size() && order_.turn_of(entries_[i]) <= stamp; ++i) filter.process(entries_[i]);
   filter.predict_to(stamp);
   return filter;
 }
@@ -261,8 +158,8 @@ void ReplayFilter::replay_from(std::size_t entry) {
 
 /// Processes what no sample of the IMU with a newer stamp will precede.
 void ReplayFilter::run() {
-  const Stamp until{newest_.ns - lead_ns_};
-  for (; processed_ < entries_.size() && turn_of(entries_[processed_]) <= until; ++processed_) {
+  const Stamp until{newest_.ns - order_.lead_ns()};
+  for (; processed_ < entries_.size() && order_.turn_of(entries_[processed_]) <= until; ++processed_) {
     if (opens_cell(processed_)) snapshots_.push_back({processed_, filter_.memory()});
     filter_.process(entries_[processed_]);
   }
@@ -323,7 +220,7 @@ bool ReplayFilter::get(ArchiveReader& in) {
   for (std::uint64_t i = 0; i < count; ++i) {
     const auto m = get_measurement(in);
     if (!m || !is_valid(*m)) return false;
-    if (!entries_.empty() && !precedes(entries_.back(), *m)) return false;
+    if (!entries_.empty() && !order_.precedes(entries_.back(), *m)) return false;
     entries_.push_back(*m);
   }
   if (!in.ok()) return false;

@@ -9,6 +9,7 @@
 #include "spartan/core/archive.h"
 #include "spartan/core/result.h"
 #include "spartan/localization/internal/error_state_filter.h"
+#include "spartan/localization/internal/processing_order.h"
 
 namespace spartan::internal {
 
@@ -57,8 +58,6 @@ class ReplayFilter {
   std::optional<Refusal> add_started(const Measurement& measurement);
   /// Inserts into the entries without processing; returns the index, or nothing for a duplicate.
   std::optional<std::size_t> place(const Measurement& measurement);
-  Stamp turn_of(const Measurement& measurement) const;
-  bool precedes(const Measurement& a, const Measurement& b) const;
   std::optional<Refusal> insert(const Measurement& measurement);
   void undo_leap(Stamp arrived);
   double lead_s() const;
@@ -68,10 +67,10 @@ class ReplayFilter {
   void discard_old();
 
   LocalizationOptions options_;
-  std::int64_t lead_ns_;  ///< a sample of the IMU may be needed this long before its stamp
+  ProcessingOrder order_;
   ErrorStateFilter filter_;
-  std::vector<Measurement> entries_;  ///< in the order of precedes()
-  std::size_t processed_ = 0;         ///< entries that the filter has processed; those after are newer than lead_ns_
+  std::vector<Measurement> entries_;  ///< in the order of order_
+  std::size_t processed_ = 0;         ///< entries that the filter has processed; those after are newer than its lead
   std::vector<Snapshot> snapshots_;
   Stamp start_, newest_;
   std::optional<Stamp> isolated_;  ///< stamp of the sample before if it was refused as far from all others

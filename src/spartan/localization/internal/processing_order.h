@@ -1,0 +1,35 @@
+// The order in which a filter processes measurements.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <variant>
+
+#include "spartan/localization/localization_options.h"
+#include "spartan/localization/localizer.h"
+
+namespace spartan::internal {
+
+/// By stamps, then by kind; a sample of the IMU comes earlier by InertialOptions::max_time_error_s, because it may be
+/// needed that long before its stamp.
+class ProcessingOrder {
+ public:
+  explicit ProcessingOrder(const LocalizationOptions& options)
+      : lead_ns_(std::llround(options.imu.max_time_error_s() * 1e9)) {}
+
+  std::int64_t lead_ns() const { return lead_ns_; }
+  /// When a measurement is processed.
+  Stamp turn_of(const Measurement& m) const {
+    const Stamp stamp = stamp_of_measurement(m);
+    return std::holds_alternative<ImuSample>(m) ? Stamp{stamp.ns - lead_ns_} : stamp;
+  }
+  bool precedes(const Measurement& a, const Measurement& b) const {
+    const Stamp at = turn_of(a), bt = turn_of(b);
+    return at != bt ? at < bt : a.index() < b.index();
+  }
+
+ private:
+  std::int64_t lead_ns_;
+};
+
+}  // namespace spartan::internal

@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+
+#include "spartan/localization/internal/drive_test.h"
+
+namespace spartan {
+namespace {
+
+using namespace internal;
+
+/// Steps of 0.1 m along x, each with an error of 1 mm, and no errors that last.
+std::vector<RelativeMotion> straight(int count) {
+  std::vector<RelativeMotion> motions;
+  for (int i = 0; i < count; ++i) {
+    RelativeMotion m;
+    m.from = test_stamp(i);
+    m.to = test_stamp(i + 1);
+    m.previous_from_current = Pose::from_translation({0.1, 0, 0});
+    m.covariance.diagonal() << 1e-6, 1e-6, 1e-6, 1e-16, 1e-16, 1e-16;
+    motions.push_back(m);
+  }
+  return motions;
+}
+
+LocalizationOptions white_vision() {
+  LocalizationOptions options;
+  options.vision.white_noise_factor = 1;
+  options.vision.drift_sigma_ratios = options.vision.constant_sigma_ratios = std::vector<double>(6, 0);
+  return options;
+}
+
+// A position measured after n steps of variance s² with variance r² moves step i by i/n of its share n s²/(n s² + r²),
+// and leaves the variance i s² − (i s²)²/(n s² + r²). More frames than are kept in memory at once.
+TEST(Smoother, SpreadsALateConstraintOverTheDrive) {
+  constexpr int kSteps = 300;
+  constexpr double kStep = 1e-6, kMeasured = 1e-4;
+  Smoother smoother = Smoother::create(white_vision()).value();
+  for (const RelativeMotion& m : straight(kSteps)) smoother.add(m);
+  PoseConstraint constraint;
+  constraint.stamp = test_stamp(kSteps);
+  constraint.world_from_body = Pose::from_translation({0.1 * kSteps + 0.02, -0.01, 0});
+  constraint.information.diagonal() << 1 / kMeasured, 1 / kMeasured, 1 / kMeasured, 0, 0, 0;
+  LocalizationOptions options = white_vision();
+  smoother.add(constraint);
+  const std::vector<SmoothedPose> poses = smoother.smooth({test_stamp(0), Eigen::Vector3d::UnitX(), {}});
+  ASSERT_EQ(poses.size(), std::size_t{kSteps + 1});
+  const double r = options.map_factor * kMeasured;
+  for (int i = 0; i <= kSteps; i += 25) {
+    SCOPED_TRACE(i);
+    const SmoothedPose& p = poses[static_cast<std::size_t>(i)];
+    EXPECT_EQ(p.stamp, test_stamp(i));
+    const double variance = i * kStep, share = variance / (kSteps * kStep + r);
+    const Eigen::Vector3d expected(0.1 * i + 0.02 * share, -0.01 * share, 0);
+    EXPECT_LT((p.world_from_body.pose.translation() - expected).norm(), 2e-6);
+    const double left = variance - variance * share;
+    EXPECT_NEAR(p.world_from_body.covariance(1, 1), left, 0.01 * left + 1e-11);
+  }
+}
+
+std::vector<SmoothedPose> smoothed(const LocalizationOptions& options, const std::vector<Measurement>& all) {
+  Smoother smoother = Smoother::create(options).value();
+  for (auto m = all.rbegin(); m != all.rend(); ++m) smoother.add(*m);  // the order does not matter
+  return smoother.smooth({test_stamp(2.5), Eigen::Vector3d::UnitX(), {}});
+}
+
+TEST(Smoother, EndsAtTheEstimateOfTheFilter) {
+  const auto all = in_order(test_samples(TestDrive(), 62.5, {}, 3), test_motions(TestDrive(), 62.5, 1, 3));
+  const std::vector<SmoothedPose> poses = smoothed(test_options(), all);
+  const UncertainPose filter = driven(test_options(), all).estimate_at(poses.back().stamp)->world_from_body;
+  EXPECT_LT(log_se3(poses.back().world_from_body.pose.inverse() * filter.pose).norm(), 1e-9);
+  EXPECT_LT((poses.back().world_from_body.covariance - filter.covariance).norm(), 1e-3 * filter.covariance.norm());
+}
+
+struct Errors {
+  double filter_m2 = 0, smoother_m2 = 0;  ///< mean squares of the positions
+  double nees = 0;                        ///< mean of the smoother, 6 degrees of freedom
+};
+
+/// Over the frames of drives with other errors each; a map measures the position every 15 s with 0.1 mm.
+Errors errors_of(const TestSensors& sensors, int drives) {
+  Errors sum;
+  double count = 0;
+  const TestDrive drive;
+  for (int seed = 1; seed <= drives; ++seed) {
+    const auto s = static_cast<std::uint64_t>(seed);
+    auto all = in_order(test_samples(drive, 62.5, sensors, s), test_motions(drive, 62.5, 1, s));
+    Localizer before = Localizer::create(test_options()).value();
+    for (const Measurement& m : all) {
+      if (stamp_of_measurement(m) <= test_stamp(2.5)) before.add(m);
+    }
+    before.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
+    const Pose first = before.estimate().world_from_body.pose;
+    Random random(s, 77);
+    for (const double t : {17.5, 32.5, 47.5, 62.5}) {
+      PoseConstraint c;
+      c.stamp = test_stamp(t);
+      c.world_from_body = first * drive.at(2.5).inverse() * drive.at(t) * Pose::from_translation(normal3(random, 1e-4));
+      c.information.diagonal().head<3>().setConstant(1e8);
+      all.push_back(c);
+    }
+    std::stable_sort(all.begin(), all.end(), comes_before);
+    LocalizationOptions options = test_options();
+    options.map_factor = 1;
+    const std::vector<SmoothedPose> poses = smoothed(options, all);
+    Localizer localizer = Localizer::create(options).value();
+    std::size_t frame = 0;
+    for (const Measurement& m : all) {
+      if (!localizer.started() && stamp_of_measurement(m) > test_stamp(2.5))
+        localizer.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
+      localizer.add(m);
+      if (!std::holds_alternative<RelativeMotion>(m)) continue;
+      const UncertainPose filter = localizer.estimate_at(stamp_of_measurement(m))->world_from_body;
+      const SmoothedPose& p = poses[++frame];
+      EXPECT_EQ(p.stamp, stamp_of_measurement(m));
+      const Pose truth = first * drive.at(2.5).inverse() *
+                         drive.at(seconds_between(test_stamp(0), p.stamp));
+      const auto error = [&](const UncertainPose& of) { return log_se3(of.pose.inverse() * truth); };
+      const auto nees = [&](const UncertainPose& of) { return error(of).dot(of.covariance.ldlt().solve(error(of))); };
+      sum.filter_m2 += (filter.pose.translation() - truth.translation()).squaredNorm();
+      sum.smoother_m2 += (p.world_from_body.pose.translation() - truth.translation()).squaredNorm();
+      sum.nees += nees(p.world_from_body);
+      ++count;
+    }
+  }
+  return {sum.filter_m2 / count, sum.smoother_m2 / count, sum.nees / count};
+}
+
+TEST(Smoother, IsBetterThanTheFilterAndConsistent) {
+  for (const TestSensors& sensors : {TestSensors{true, true, true, true}, TestSensors{true, false, false, false},
+                                     TestSensors{false, false, false, false}}) {
+    SCOPED_TRACE(::testing::Message() << "imu " << sensors.imu << " wheels " << sensors.wheels);
+    const Errors e = errors_of(sensors, 8);
+    EXPECT_LT(e.smoother_m2, 0.4 * e.filter_m2);
+    EXPECT_NEAR(e.nees, 6, 1.5);
+  }
+}
+
+}  // namespace
+}  // namespace spartan
