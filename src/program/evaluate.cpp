@@ -61,8 +61,9 @@ void add_evaluate(CLI::App& app, Context& context) {
   command
       ->add_option(
           "--trajectory", arguments->trajectory,
-          "Trajectory of the run folder: odometry, slam or localization (default: the last of these that exists).")
-      ->check(CLI::IsMember({"odometry", "slam", "localization"}))
+          "Trajectory of the run folder: odometry, slam or localization (default: the last of these that exists), or "
+          "smoothed.")
+      ->check(CLI::IsMember({"odometry", "slam", "localization", "smoothed"}))
       ->option_text("WHICH");
   auto* segments = command
                        ->add_option("--segments", arguments->options.segment_lengths_m,

@@ -36,8 +36,8 @@ void add_export(CLI::App& app, Context& context) {
   command->add_option("-o,--output", a->output, "File to write.")->required();
   command
       ->add_option("--trajectory", a->trajectory,
-                   "Trajectory: odometry, slam or localization (default: the last of these that exists).")
-      ->check(CLI::IsMember({"odometry", "slam", "localization"}));
+                   "Trajectory: odometry, slam or localization (default: the last of these that exists), or smoothed.")
+      ->check(CLI::IsMember({"odometry", "slam", "localization", "smoothed"}));
   add_force_flag(*command, context);
   add_threads_option(*command, context);
 }

@@ -239,7 +239,7 @@ TEST_F(Stops, OdometryOnlyGivesTheSameOdometry) {
   EXPECT_EQ(summary["absent"], nlohmann::json::parse(R"(["localization", "slam", "maps", "terrain"])"));
   EXPECT_TRUE(summary["health"]["localization"].empty());
   EXPECT_TRUE(maps_of("alone").empty());
-  for (const char* file : {"trajectory_slam.tum", "trajectory_localization.tum", "maps/global.tif"})
+  for (const char* file : {"trajectory_slam.tum", "trajectory_localization.tum", "trajectory_smoothed.tum", "maps/global.tif"})
     EXPECT_FALSE(fs::exists(path("alone/") + file)) << file;
   EXPECT_TRUE(fs::exists(path("alone/report/index.html"))) << alone.err;
 
@@ -266,12 +266,13 @@ TEST_F(Stops, OdometryOnlyGivesTheSameOdometry) {
 }
 
 TEST_F(Stops, EachTrajectoryIsExported) {
-  for (const std::string kind : {"odometry", "slam", "localization"}) {
+  for (const std::string kind : {"odometry", "slam", "localization", "smoothed"}) {
     ASSERT_EQ(
         run_program({"export", path("whole"), "--format", "tum", "--trajectory", kind, "-o", path(kind)}).exit_code, 0);
     EXPECT_EQ(testing::content_of(path(kind)), testing::content_of(path("whole/trajectory_" + kind + ".tum")));
   }
   EXPECT_NE(testing::content_of(path("odometry")), testing::content_of(path("localization")));
+  EXPECT_NE(testing::content_of(path("smoothed")), testing::content_of(path("localization")));
   ASSERT_EQ(run_program({"export", path("whole"), "--format", "tum", "-o", path("best")}).exit_code, 0);
   EXPECT_EQ(testing::content_of(path("best")), testing::content_of(path("localization")));
 }

@@ -4,7 +4,9 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
+#include "spartan/localization/internal/localization_inputs.h"
 #include "spartan/localization/internal/replay_filter.h"
 
 namespace spartan {
@@ -33,6 +35,7 @@ struct Localizer::State {
       refusal = filter.add(m);
     }
     if (refusal) refusals[static_cast<std::size_t>(sensor_of(m))].count(*refusal);
+    if (!refusal && inputs) inputs->add(m);
     return !refusal;
   }
 
@@ -59,6 +62,7 @@ struct Localizer::State {
   LocalizationOptions options;
   ReplayFilter filter;
   std::array<RefusalCounts, kLocalizationSensors> refusals;
+  std::optional<LocalizationInputs> inputs;
 };
 
 Result<Localizer> Localizer::create(const LocalizationOptions& options) {
@@ -78,6 +82,7 @@ Localizer::~Localizer() = default;
 void Localizer::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
                       const std::optional<Eigen::Vector3d>& up_in_body, const Eigen::Vector3d& assumed_up_in_body) {
   state_->filter.start(stamp, ahead_in_body, up_in_body, assumed_up_in_body);
+  if (state_->inputs) state_->inputs->start = {stamp, ahead_in_body, up_in_body, assumed_up_in_body};
 }
 bool Localizer::started() const {
   return state_->filter.started();
@@ -151,7 +156,18 @@ Bytes Localizer::save() const {
     out.put(r.reversed);
   }
   state_->filter.put(out);
+  const Bytes inputs = state_->inputs.value_or(LocalizationInputs()).bytes();
+  out.put_array(inputs.data(), inputs.size());
   return out.take();
+}
+
+void Localizer::keep_inputs() {
+  state_->inputs.emplace();
+}
+
+Bytes Localizer::take_inputs() {
+  if (!state_->inputs || state_->inputs->empty()) return {};
+  return std::exchange(*state_->inputs, {}).bytes();
 }
 
 Status Localizer::restore(const Bytes& bytes) {
@@ -173,8 +189,12 @@ Status Localizer::restore(const Bytes& bytes) {
     r.reversed = count();
   }
   possible = possible && state->filter.get(in);
+  const Bytes inputs = in.get_array<std::uint8_t>();
   if (Status status = in.finish(what); !status) return status;
   if (!possible) return failure(ErrorCode::store_damaged, "is damaged", what, "run again into a new folder");
+  auto parsed = parse_localization_inputs(inputs);
+  if (!parsed) return failure(parsed);
+  if (state_->inputs) state->inputs = std::move(*parsed);
   state_ = std::move(state);
   return {};
 }

@@ -255,6 +255,11 @@ class Localizer {
   Bytes save() const;
   Status restore(const Bytes& bytes);
 
+  /// From now on keeps the start and all accepted measurements for take_inputs().
+  void keep_inputs();
+  /// Those since the last call, as a versioned value for Smoother::add; empty if there are none.
+  Bytes take_inputs();
+
  private:
   struct State;
   explicit Localizer(std::unique_ptr<State> state);
@@ -285,10 +290,14 @@ class Smoother {
   Smoother& operator=(Smoother&&) noexcept;
   ~Smoother();
 
+  /// How the localization was started.
+  void start(const LocalizationStart& start);
   /// A measurement that Localizer::add accepted, in any order.
   void add(const Measurement& measurement);
-  /// At the start and at every visual motion after it, in order of time.
-  std::vector<SmoothedPose> smooth(const LocalizationStart& start) const;
+  /// Both, by Localizer::take_inputs. Codes as Localizer::restore.
+  Status add(const Bytes& inputs);
+  /// At the start and at every visual motion after it, in order of time; nothing without a start.
+  std::vector<SmoothedPose> smooth() const;
 
  private:
   struct State;

@@ -3,6 +3,7 @@
 #include <span>
 
 #include "spartan/localization/internal/error_state_filter.h"
+#include "spartan/localization/internal/localization_inputs.h"
 #include "spartan/localization/internal/measurement_log.h"
 #include "spartan/localization/localizer.h"
 
@@ -57,6 +58,7 @@ struct Smoother::State {
 
   LocalizationOptions options;
   ProcessingOrder order;
+  std::optional<LocalizationStart> start;
   MeasurementLog log;
 };
 
@@ -124,11 +126,24 @@ void Smoother::add(const Measurement& measurement) {
   state_->log.add(m, state_->order);
 }
 
-std::vector<SmoothedPose> Smoother::smooth(const LocalizationStart& start) const {
+void Smoother::start(const LocalizationStart& start) {
+  state_->start = start;
+}
+
+Status Smoother::add(const Bytes& inputs) {
+  const auto parsed = parse_localization_inputs(inputs);
+  if (!parsed) return failure(parsed);
+  if (parsed->start) state_->start = parsed->start;
+  for (const Measurement& m : parsed->measurements) state_->log.add(m, state_->order);
+  return {};
+}
+
+std::vector<SmoothedPose> Smoother::smooth() const {
+  if (!state_->start) return {};
   MeasurementLog log = state_->log;
   log.sort();
   Pass pass(state_->options, log);
-  pass.start(start);
+  pass.start(*state_->start);
   std::vector<Pass::Place> places{pass.place()};
   std::size_t frames = 1;
   for (; pass.to_next_frame(); ++frames) {

@@ -43,7 +43,8 @@ TEST(Smoother, SpreadsALateConstraintOverTheDrive) {
   constraint.information.diagonal() << 1 / kMeasured, 1 / kMeasured, 1 / kMeasured, 0, 0, 0;
   LocalizationOptions options = white_vision();
   smoother.add(constraint);
-  const std::vector<SmoothedPose> poses = smoother.smooth({test_stamp(0), Eigen::Vector3d::UnitX(), {}});
+  smoother.start({test_stamp(0), Eigen::Vector3d::UnitX(), {}});
+  const std::vector<SmoothedPose> poses = smoother.smooth();
   ASSERT_EQ(poses.size(), std::size_t{kSteps + 1});
   const double r = options.map_factor * kMeasured;
   for (int i = 0; i <= kSteps; i += 25) {
@@ -61,7 +62,8 @@ TEST(Smoother, SpreadsALateConstraintOverTheDrive) {
 std::vector<SmoothedPose> smoothed(const LocalizationOptions& options, const std::vector<Measurement>& all) {
   Smoother smoother = Smoother::create(options).value();
   for (auto m = all.rbegin(); m != all.rend(); ++m) smoother.add(*m);  // the order does not matter
-  return smoother.smooth({test_stamp(2.5), Eigen::Vector3d::UnitX(), {}});
+  smoother.start({test_stamp(2.5), Eigen::Vector3d::UnitX(), {}});
+  return smoother.smooth();
 }
 
 TEST(Smoother, EndsAtTheEstimateOfTheFilter) {
@@ -70,6 +72,61 @@ TEST(Smoother, EndsAtTheEstimateOfTheFilter) {
   const UncertainPose filter = driven(test_options(), all).estimate_at(poses.back().stamp)->world_from_body;
   EXPECT_LT(log_se3(poses.back().world_from_body.pose.inverse() * filter.pose).norm(), 1e-9);
   EXPECT_LT((poses.back().world_from_body.covariance - filter.covariance).norm(), 1e-3 * filter.covariance.norm());
+}
+
+bool same(const UncertainPose& a, const UncertainPose& b) {
+  return log_se3(a.pose.inverse() * b.pose).norm() == 0 && (a.covariance - b.covariance).norm() == 0;
+}
+
+// Also those that were refused later on, of an IMU with a clock of its own.
+TEST(Smoother, TakesTheInputsOfALocalizerInParts) {
+  LocalizationOptions options = test_options();
+  options.imu.time_offset_s = 0.02;
+  auto all = in_order(test_samples(TestDrive(), 32.5, {}, 3), test_motions(TestDrive(), 32.5, 1, 3));
+  Localizer localizer = Localizer::create(options).value();
+  localizer.keep_inputs();
+  Smoother by_bytes = Smoother::create(options).value(), by_measurements = Smoother::create(options).value();
+  int refused = 0;
+  for (const Measurement& m : all) {
+    if (!localizer.started() && stamp_of_measurement(m) > test_stamp(2.5))
+      localizer.start(test_stamp(2.5), Eigen::Vector3d::UnitX());
+    if (localizer.add(m)) by_measurements.add(m);
+    refused += localizer.add(WheelSample{test_stamp(-100), 0, 0}) ? 0 : 1;
+    if (std::holds_alternative<RelativeMotion>(m)) {
+      ASSERT_TRUE(by_bytes.add(localizer.take_inputs()));
+    }
+  }
+  EXPECT_GT(refused, 0);
+  ASSERT_TRUE(by_bytes.add(localizer.take_inputs()));
+  EXPECT_TRUE(by_measurements.smooth().empty()) << "without a start";
+  by_measurements.start({test_stamp(2.5), Eigen::Vector3d::UnitX(), {}});
+  const std::vector<SmoothedPose> a = by_bytes.smooth(), b = by_measurements.smooth();
+  ASSERT_EQ(a.size(), std::size_t{21});
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_TRUE(same(a[i].world_from_body, b[i].world_from_body)) << i;
+}
+
+TEST(Smoother, RefusesDamagedInputs) {
+  Localizer localizer = Localizer::create(test_options()).value();
+  localizer.keep_inputs();
+  localizer.add(WheelSample{test_stamp(1), 0, 0});
+  // Those that were not taken are saved.
+  Localizer restored = Localizer::create(test_options()).value();
+  restored.keep_inputs();
+  ASSERT_TRUE(restored.restore(localizer.save()));
+  const Bytes inputs = localizer.take_inputs();
+  EXPECT_EQ(restored.take_inputs(), inputs);
+  EXPECT_TRUE(localizer.take_inputs().empty());
+  Smoother smoother = Smoother::create(test_options()).value();
+  for (std::size_t size = 0; size < inputs.size(); ++size) {
+    const Status added = smoother.add(Bytes(inputs.begin(), inputs.begin() + static_cast<std::ptrdiff_t>(size)));
+    ASSERT_FALSE(added);
+    EXPECT_EQ(added.error().code, ErrorCode::store_damaged);
+  }
+  Bytes other_version = inputs;
+  other_version[0] ^= 1;
+  EXPECT_EQ(smoother.add(other_version).error().code, ErrorCode::configuration);
+  EXPECT_TRUE(smoother.add(inputs));
 }
 
 struct Errors {

@@ -39,7 +39,7 @@ Result<TrajectoryKind> choose_kind(const RunFolder& run, const std::string& requ
 
 // "slam" for a path ".../trajectory_slam.tum", else "file".
 std::string kind_of_file(const fs::path& path) {
-  for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
+  for (const TrajectoryKind kind : kTrajectories) {
     if (path.filename() == fs::path(RunFolder{}.trajectory(kind)).filename()) return std::string(name_of(kind));
   }
   return "file";

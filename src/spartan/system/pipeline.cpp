@@ -318,6 +318,11 @@ std::vector<StageTime> Pipeline::take_stage_times() {
   return state_->clock.take();
 }
 
+Bytes Pipeline::take_localization_inputs() {
+  const RunOptions& o = state_->options;
+  return o.smoothed_trajectory && !o.odometry_only ? state_->localizer.take_inputs() : Bytes();
+}
+
 void Pipeline::store_maps_in(TileStore& store) {
   state_->merger.page_to(&store);
 }

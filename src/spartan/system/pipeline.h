@@ -104,6 +104,9 @@ class Pipeline {
 
   /// Times of the stages since the last result: views of a stop and its mapping.
   std::vector<StageTime> take_stage_times();
+  /// What the localization was given since the last call (Localizer::take_inputs); empty where nothing
+  /// is smoothed.
+  Bytes take_localization_inputs();
 
   /// After restore(): frames of the current stop whose images must be passed to restore_frame() again, in this order,
   /// before the next frame is added.

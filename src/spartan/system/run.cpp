@@ -15,8 +15,10 @@
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/system/internal/pipeline_state.h"
 #include "spartan/system/internal/run_loop.h"
 #include "spartan/system/internal/run_setup.h"
+#include "spartan/system/internal/smoothed_trajectory.h"
 #include "spartan/system/internal/summary.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/pipeline.h"
@@ -94,8 +96,13 @@ Result<RunOutcome> write_results(RunLoop& run_loop, const RunOptions& options, c
                                  const RunFolder& folder, RunFacts facts, const Log& log) {
   const auto frames = run_loop.store().frames();
   if (!frames) return failure(frames);
-  for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
+  for (const TrajectoryKind kind : kTrajectories) {
     if (options.odometry_only && kind != TrajectoryKind::odometry) continue;
+    if (kind == TrajectoryKind::smoothed && !has_trajectory(*frames, kind)) {
+      std::error_code ignored;
+      std::filesystem::remove(folder.trajectory(kind), ignored);  // of the run before it was resumed
+      continue;
+    }
     if (Status s = write_file_atomically(folder.trajectory(kind), to_tum(trajectory_of(*frames, kind))); !s)
       return failure(s);
   }
@@ -191,9 +198,14 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
         "the vertical was not measured: z of the world is the up axis of the body at the start, and maps are tilted "
         "with it");
   }
+  const RunOptions resolved = resolved_options(options, rig);
+  if (options.smoothed_trajectory && !options.odometry_only && !run_loop.stopped()) {
+    if (Status s = write_smoothed_trajectory(run_loop.store(), with_gravity(resolved), hooks.log); !s)
+      return failure(s);
+  }
   RunFacts facts = facts_of(request, **source, options, run_loop);
   facts.level_by_ground = setup->ground_up.has_value();
-  auto outcome = write_results(run_loop, resolved_options(options, rig), workers, folder, std::move(facts), hooks.log);
+  auto outcome = write_results(run_loop, resolved, workers, folder, std::move(facts), hooks.log);
   if (outcome) outcome->lock = std::move(prepared->lock);
   return outcome;
 }

@@ -67,7 +67,7 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
 }
 
 Result<ReplacedFolder> replace_run_folder(const RunFolder& folder) {
-  constexpr std::array<std::string_view, 13> kEntries{"run.sqlite",
+  constexpr std::array<std::string_view, 14> kEntries{"run.sqlite",
                                                       "run.sqlite-wal",
                                                       "run.sqlite-shm",
                                                       "config.yaml",
@@ -77,6 +77,7 @@ Result<ReplacedFolder> replace_run_folder(const RunFolder& folder) {
                                                       "trajectory_odometry.tum",
                                                       "trajectory_slam.tum",
                                                       "trajectory_localization.tum",
+                                                      "trajectory_smoothed.tum",
                                                       "maps",
                                                       "terrain",
                                                       "report"};

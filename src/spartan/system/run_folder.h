@@ -16,12 +16,16 @@
 
 namespace spartan {
 
-/// Odometry: vision alone. SLAM: odometry corrected by map matching. Localization: all sensors.
-enum class TrajectoryKind { odometry, slam, localization };
+/// Odometry: vision alone. SLAM: odometry corrected by map matching. Localization: all sensors. Smoothed: the
+/// localization by all measurements of the run, those after each frame included.
+enum class TrajectoryKind { odometry, slam, localization, smoothed };
+inline constexpr std::array kTrajectories{TrajectoryKind::odometry, TrajectoryKind::slam, TrajectoryKind::localization,
+                                          TrajectoryKind::smoothed};
+/// Those that were known at each frame.
 inline constexpr std::array kTrajectoriesBestFirst{TrajectoryKind::localization, TrajectoryKind::slam,
                                                    TrajectoryKind::odometry};
 
-/// "odometry", "slam" or "localization", as in file names and on the command line.
+/// "odometry", "slam", "localization" or "smoothed", as in file names and on the command line.
 std::string_view name_of(TrajectoryKind kind);
 std::optional<TrajectoryKind> parse_trajectory_kind(std::string_view name);
 

@@ -107,6 +107,7 @@ struct RunOptions {
   KeyframeOptions keyframes;
   SlamOptions slam;  ///< map matching and the global map
   LocalizationOptions localization;
+  bool smoothed_trajectory = true;  ///< run(): smooth the localization after the last frame
   TerrainOptions terrain;
 
   template <class Visitor>
@@ -143,6 +144,10 @@ struct RunOptions {
     v.group("mapping", mapping);
     v.group("slam", slam);
     v.group("localization", localization);
+    v.field("smoothed_trajectory", smoothed_trajectory,
+            "True smooths the localization after the last frame, by all measurements of the run "
+            "(trajectory_smoothed.tum); false saves the time and the memory for it (1 kB for each frame, 60 bytes for "
+            "each sample of the IMU).");
     v.group("terrain", terrain);
   }
 };

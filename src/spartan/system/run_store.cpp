@@ -49,6 +49,8 @@ constexpr const char* kAddedTables = R"(
 CREATE TABLE IF NOT EXISTS elapsed (id INTEGER PRIMARY KEY CHECK (id = 1), wall_ms REAL NOT NULL, cpu_ms REAL NOT NULL);
 CREATE TABLE IF NOT EXISTS counts (
   id INTEGER PRIMARY KEY CHECK (id = 1), frames INTEGER NOT NULL, terrain INTEGER NOT NULL, maps INTEGER NOT NULL);
+CREATE TABLE IF NOT EXISTS localization_inputs (seq INTEGER NOT NULL, inputs BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS smoothed (seq INTEGER PRIMARY KEY, pose BLOB NOT NULL, covariance BLOB NOT NULL);
 )";
 // Frames are numbered from 1 without gaps; terrain views and maps are committed in the order of their stamps.
 constexpr const char* kReturnToCheckpoint = R"(
@@ -58,6 +60,8 @@ DELETE FROM stage_times WHERE seq > (SELECT frames FROM counts);
 DELETE FROM localization WHERE seq > (SELECT frames FROM counts);
 DELETE FROM slam WHERE seq > (SELECT frames FROM counts);
 DELETE FROM health WHERE seq > (SELECT frames FROM counts);
+DELETE FROM localization_inputs WHERE seq > (SELECT frames FROM counts);
+DELETE FROM smoothed;
 DELETE FROM terrain WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
   SELECT stamp_ns FROM terrain ORDER BY stamp_ns LIMIT (SELECT terrain FROM counts));
 DELETE FROM maps WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
@@ -157,6 +161,11 @@ Status RunStore::State::prepare() {
     return s;
   if (Status s = make(insert_slam, "INSERT INTO slam VALUES ((SELECT max(seq) FROM frames),?,?)"); !s) return s;
   if (Status s = make(insert_health, "INSERT INTO health VALUES ((SELECT max(seq) FROM frames),?,?,?)"); !s) return s;
+  if (Status s =
+          make(insert_inputs, "INSERT INTO localization_inputs VALUES ((SELECT coalesce(max(seq), 0) FROM frames),?)");
+      !s)
+    return s;
+  if (Status s = make(insert_smoothed, "INSERT INTO smoothed VALUES (?,?,?)"); !s) return s;
   if (Status s = make(insert_map, "INSERT INTO maps VALUES (?,?,?,?,?,?,?,?,?,?,?)"); !s) return s;
   if (Status s = make(insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"); !s) return s;
   if (Status s = make(replace_checkpoint, "INSERT OR REPLACE INTO memory VALUES (1,?,?)"); !s) return s;
@@ -220,6 +229,11 @@ Status RunStore::State::write(const Step& step) {
   }
   if (step.map) {
     if (Status s = write(*step.map); !s) return s;
+  }
+  if (!step.localization_inputs.empty()) {
+    Bytes inputs = step.localization_inputs;
+    append_checksum(inputs);
+    if (Status s = insert_inputs->bind(1, inputs).run(); !s) return s;
   }
   return write(step.times);
 }
@@ -357,6 +371,21 @@ Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& 
     const auto pipeline_state = save();
     if (!pipeline_state) return failure(pipeline_state);
     return state_->write_checkpoint(*pipeline_state, source, elapsed);
+  });
+}
+
+Status RunStore::commit_smoothed(const std::vector<std::optional<UncertainPose>>& poses) {
+  return state_->commit([&]() -> Status {
+    if (Status s = state_->db.execute("DELETE FROM smoothed"); !s) return s;
+    std::int64_t seq = 0;
+    for (const std::optional<UncertainPose>& pose : poses) {
+      ++seq;
+      if (!pose) continue;
+      SqlStatement& i = *state_->insert_smoothed;
+      if (Status s = i.bind(1, seq).bind(2, bytes_of(pose->pose)).bind(3, bytes_of(pose->covariance)).run(); !s)
+        return s;
+    }
+    return {};
   });
 }
 

@@ -42,6 +42,7 @@ struct FrameRecord {
   MotionEstimate motion;                           ///< its covariance includes the errors of the calibration
   std::optional<UncertainPose> slam;               ///< odometry corrected by map matching; none if missing
   std::optional<LocalizationRecord> localization;  ///< none if the frame is missing
+  std::optional<UncertainPose> smoothed;           ///< localization by all measurements; none before the end of the run
   std::vector<StageTime> times;
 };
 
@@ -101,6 +102,7 @@ class RunStore {
     std::optional<TerrainRecord> terrain;
     std::optional<MapRecord> map;
     std::vector<StageTime> times;  ///< for the last frame of the store, if the step has no frame
+    Bytes localization_inputs{};   ///< Localizer::take_inputs()
   };
   /// How far the recording was read.
   struct SourcePosition {
@@ -115,6 +117,11 @@ class RunStore {
   /// the latest are kept). Codes: as above, and those of `save`.
   Status commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source,
                 const ElapsedTime& elapsed = {});
+
+  /// Writes FrameRecord::smoothed of every frame, in their order. Codes: as commit().
+  Status commit_smoothed(const std::vector<std::optional<UncertainPose>>& poses);
+  /// Step::localization_inputs of all steps in their order; none of a run by an older version. Code `store_damaged`.
+  Result<std::vector<Bytes>> localization_inputs();
 
   /// Tables of the global map.
   TileStore& tiles();

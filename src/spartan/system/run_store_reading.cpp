@@ -61,6 +61,16 @@ tl::unexpected<Error> damaged_table(const Database& db, const char* table, const
                  "run again into a new folder");
 }
 
+/// Tables that older versions of the program did not write.
+Result<bool> has_table(Database& db, const char* name) {
+  auto select = db.prepare("SELECT count(*) FROM sqlite_master WHERE type = 'table' AND name = ?");
+  if (!select) return failure(select);
+  select->bind(1, std::string(name));
+  const auto row = select->step();
+  if (!row) return failure(row);
+  return select->integer(0) > 0;
+}
+
 bool is_pose(const Pose& pose) {
   return pose.translation().allFinite() && std::abs(pose.rotation().norm() - 1) < 1e-6;
 }
@@ -128,6 +138,23 @@ std::optional<FrameRecord> frame_of(const SqlStatement& row) {
 
 }  // namespace
 
+Result<std::vector<Bytes>> RunStore::localization_inputs() {
+  Database& db = state_->db;
+  const auto there = has_table(db, "localization_inputs");
+  if (!there) return failure(there);
+  if (!*there) return std::vector<Bytes>{};
+  auto select = db.prepare("SELECT inputs FROM localization_inputs ORDER BY rowid");
+  if (!select) return failure(select);
+  std::vector<Bytes> all;
+  for (;;) {
+    const auto row = select->step();
+    if (!row) return failure(row);
+    if (!*row) return all;
+    Bytes& inputs = all.emplace_back(select->blob(0));
+    if (!remove_checksum(inputs)) return damaged_table(db, "localization_inputs", "a checksum does not fit");
+  }
+}
+
 void append_checksum(Bytes& bytes) {
   Hash64 hash;
   hash.add(bytes.data(), bytes.size());
@@ -162,6 +189,11 @@ Result<std::vector<FrameRecord>> RunStore::frames() {
   if (!localization) return failure(localization);
   auto slam = RowsOfFrames::open(db, "SELECT * FROM slam ORDER BY seq");
   if (!slam) return failure(slam);
+  const auto was_smoothed = has_table(db, "smoothed");
+  if (!was_smoothed) return failure(was_smoothed);
+  auto smoothed = RowsOfFrames::open(
+      db, *was_smoothed ? "SELECT * FROM smoothed ORDER BY seq" : "SELECT * FROM slam WHERE seq < 0 ORDER BY seq");
+  if (!smoothed) return failure(smoothed);
   auto health = RowsOfFrames::open(db, "SELECT seq, sensor, state, reason FROM health ORDER BY rowid");
   if (!health) return failure(health);
   std::vector<FrameRecord> records;
@@ -181,6 +213,12 @@ Result<std::vector<FrameRecord>> RunStore::frames() {
       read = slam->of(seq, [&](const SqlStatement& corrected) {
         r.slam = uncertain_pose_of(corrected, 1);
         if (!r.slam) damaged = "slam";
+      });
+    }
+    if (read) {
+      read = smoothed->of(seq, [&](const SqlStatement& by_all) {
+        r.smoothed = uncertain_pose_of(by_all, 1);
+        if (!r.smoothed) damaged = "smoothed";
       });
     }
     if (read) {

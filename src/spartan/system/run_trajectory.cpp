@@ -12,12 +12,14 @@ std::string_view name_of(TrajectoryKind kind) {
       return "slam";
     case TrajectoryKind::localization:
       return "localization";
+    case TrajectoryKind::smoothed:
+      return "smoothed";
   }
   return "";
 }
 
 std::optional<TrajectoryKind> parse_trajectory_kind(std::string_view name) {
-  for (const TrajectoryKind kind : kTrajectoriesBestFirst) {
+  for (const TrajectoryKind kind : kTrajectories) {
     if (name_of(kind) == name) return kind;
   }
   return std::nullopt;
@@ -27,6 +29,7 @@ std::optional<UncertainPose> pose_of(const FrameRecord& frame, TrajectoryKind ki
   if (kind == TrajectoryKind::localization) {
     return frame.localization ? std::optional(frame.localization->world_from_body) : std::nullopt;
   }
+  if (kind == TrajectoryKind::smoothed) return frame.smoothed;
   if (!frame.has_pose) return std::nullopt;
   return kind == TrajectoryKind::slam ? frame.slam : std::optional(frame.world_from_body);
 }
@@ -34,7 +37,7 @@ std::optional<UncertainPose> pose_of(const FrameRecord& frame, TrajectoryKind ki
 bool has_trajectory(const std::vector<FrameRecord>& frames, TrajectoryKind kind) {
   if (kind == TrajectoryKind::odometry) return true;
   return std::any_of(frames.begin(), frames.end(), [kind](const FrameRecord& frame) {
-    return kind == TrajectoryKind::slam ? frame.slam.has_value() : frame.localization.has_value();
+    return pose_of(frame, kind).has_value();
   });
 }
 

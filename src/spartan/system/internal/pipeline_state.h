@@ -52,6 +52,7 @@ struct Pipeline::State {
         maps && (options.maps_from == MapSource::keyframes || (options.maps_from == MapSource::automatic && !several));
     maps_stops = maps && !maps_keyframes && several;
     computes_terrain = options.terrain.enabled && !options.odometry_only;
+    if (options.smoothed_trajectory && !options.odometry_only) localizer.keep_inputs();
   }
 
   Rig rig;

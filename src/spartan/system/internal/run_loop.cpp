@@ -120,6 +120,7 @@ Status RunLoop::finish() {
     step.map = *map;
   }
   step.times = take_stage_times();
+  step.localization_inputs = pipeline_.take_localization_inputs();
   if (frames_ == 0 || (!step.map && step.times.empty())) return {};
   return checkpoint(step);
 }
@@ -234,7 +235,8 @@ Status RunLoop::process_missing(const MissingFrame& missing) {
   return commit(step);
 }
 
-Status RunLoop::commit(const RunStore::Step& step) {
+Status RunLoop::commit(RunStore::Step step) {
+  step.localization_inputs = pipeline_.take_localization_inputs();
   if (resumed_ && !resumed_from_frame_ && step.frame) resumed_from_frame_ = step.frame->frame_id;
   ++frames_since_checkpoint_;
   const bool due = frames_ == 0 || frames_since_checkpoint_ >= kFramesPerCheckpoint;

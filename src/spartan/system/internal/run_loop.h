@@ -63,7 +63,7 @@ class RunLoop {
   /// Of a frame with one image, the motion is measured in it.
   Status process_missing(const MissingFrame& missing);
   /// Commits a frame, with a checkpoint where one is due.
-  Status commit(const RunStore::Step& step);
+  Status commit(RunStore::Step step);
   Status checkpoint(const RunStore::Step& step);
   std::vector<StageTime> take_stage_times();
 
