@@ -26,8 +26,9 @@ void ErrorStateFilter::update(const CompassSample& sample) {
   advance_to(sample.stamp);
   // A vertical of variance σ² biases headings by up to ½ σ², always in the same direction.
   const double tilt_bias = 0.5 * memory_.estimate.covariance.diagonal().segment<2>(error_at::kGravityTilt).sum();
-  const double sigma = std::hypot(std::max(sample.sigma_rad, options_.compass.min_sigma_rad),
-                                  std::sqrt(kReadingsPerTiltError) * tilt_bias);
+  NoiseRatio& noise = memory_.compass.noise;
+  const double stated = std::max(sample.sigma_rad, options_.compass.min_sigma_rad);
+  const double sigma = std::hypot(stated * std::sqrt(noise.factor()), std::sqrt(kReadingsPerTiltError) * tilt_bias);
   if (!memory_.compass.offset_known) {
     initialize_compass_offset(sample, sigma);
     return;
@@ -36,6 +37,7 @@ void ErrorStateFilter::update(const CompassSample& sample) {
   const double nis = normalized_innovation_squared(memory_.estimate.covariance, innovation);
   const bool use = accept(LocalizationSensor::compass, nis, 1, HealthReason::disagrees);
   if (use) {
+    if (inertial_usable()) noise.add(memory_.estimate.covariance, innovation, stated * stated);
     correct_world(innovation);
   } else if (memory_.monitor(LocalizationSensor::compass).state == SensorState::excluded) {
     memory_.estimate.covariance(error_at::kCompassOffset, error_at::kCompassOffset) +=
@@ -68,7 +70,8 @@ void ErrorStateFilter::initialize_compass_offset(const CompassSample& sample, do
 }
 
 double ErrorStateFilter::inclinometer_sigma(const InclinometerSample& sample) const {
-  return options_.inclinometer.noise_factor * std::max(sample.sigma_rad, options_.inclinometer.min_sigma_rad);
+  return options_.inclinometer.noise_factor * std::max(sample.sigma_rad, options_.inclinometer.min_sigma_rad) *
+         std::sqrt(memory_.inclinometer.noise.factor());
 }
 
 void ErrorStateFilter::update(const InclinometerSample& sample) {
@@ -88,6 +91,8 @@ void ErrorStateFilter::update(const InclinometerSample& sample) {
   const double nis = normalized_innovation_squared(memory_.estimate.covariance, innovation);
   const bool use = accept(LocalizationSensor::inclinometer, nis, 2, HealthReason::disagrees);
   if (use) {
+    NoiseRatio& noise = memory_.inclinometer.noise;
+    if (inertial_usable()) noise.add(memory_.estimate.covariance, innovation, sigma * sigma / noise.factor());
     correct_world(innovation);
   } else if (memory_.monitor(LocalizationSensor::inclinometer).state == SensorState::excluded) {
     memory_.estimate.covariance.diagonal().segment<2>(error_at::kInclinometerBias) +=

@@ -103,6 +103,7 @@ class ErrorStateFilter {
   void remember_motion(const RelativeMotion& motion, bool uncertain);
   std::optional<InclinometerSample> tilt_at(Stamp stamp) const;
   std::optional<double> compare_with_inclinometer(const VisualMotion& visual) const;
+  void learn_inclinometer(const MotionEvidence& evidence);
   std::optional<WheelStep> wheel_step_since_frame(Stamp stamp) const;
   std::optional<double> compare_with_wheels(const VisualMotion& visual) const;
   std::optional<ForwardComparison> compare_forward(const VisualMotion& visual) const;

@@ -153,6 +153,9 @@ void visit(Each& each, Memory& m) {
   each(m.compass.heading_east), each(m.compass.offset_known), each(m.compass.pending);
   for (auto& offset : m.compass.offsets) each(offset);
   for (auto& sigma : m.compass.sigmas) each(sigma);
+  each(m.compass.noise.ratio), each(m.compass.noise.weight);
+  each(m.inclinometer.noise.ratio), each(m.inclinometer.noise.weight);
+  each(m.inclinometer.of_motions.ratio), each(m.inclinometer.of_motions.weight);
   each(m.inclinometer.known), visit_tilt(each, m.inclinometer.last);
   for (auto& monitor : m.monitors) visit_monitor(each, monitor);
 }

@@ -11,6 +11,7 @@
 #include "spartan/localization/internal/error_state.h"
 #include "spartan/localization/internal/imu_queue.h"
 #include "spartan/localization/internal/inertial_noise.h"
+#include "spartan/localization/internal/noise_ratio.h"
 #include "spartan/localization/localizer.h"
 
 namespace spartan::internal {
@@ -90,12 +91,15 @@ struct WheelMemory {
 };
 
 struct InclinometerMemory {
+  NoiseRatio noise;
+  NoiseRatio of_motions;  ///< of the difference of two readings to the visual motion between them
   bool known = false;
   InclinometerSample last;
 };
 
 struct CompassMemory {
   static constexpr std::size_t kPending = 5;
+  NoiseRatio noise;
   bool heading_east = false;  ///< the world's x is east by the readings before the start
   bool offset_known = false;
   std::uint32_t pending = 0;

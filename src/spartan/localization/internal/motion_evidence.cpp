@@ -86,7 +86,8 @@ std::optional<InclinometerSample> ErrorStateFilter::tilt_at(Stamp stamp) const {
   return tilt.last;
 }
 
-/// NIS of the direction of up at the end of the visual motion against the readings at both ends; their bias cancels.
+/// NIS of the direction of up at the end of the visual motion against the readings at both ends; their bias cancels. A
+/// rover that rocks differs more from the readings, which come before the frames: their noise is measured.
 std::optional<double> ErrorStateFilter::compare_with_inclinometer(const VisualMotion& visual) const {
   const RelativeMotion& motion = visual.motion;
   const std::optional<InclinometerSample> now = tilt_at(motion.to);
@@ -105,7 +106,13 @@ std::optional<double> ErrorStateFilter::compare_with_inclinometer(const VisualMo
   const Eigen::Matrix2d covariance = by_rotation * motion.covariance.bottomRightCorner<3, 3>() * by_rotation.transpose() +
                                      variance * Eigen::Matrix2d::Identity();
   const Eigen::Vector2d residual = directions * (measured - seen);
-  return residual.dot(covariance.ldlt().solve(residual));
+  return residual.dot(covariance.ldlt().solve(residual)) / std::max(1.0, memory_.inclinometer.of_motions.factor());
+}
+
+void ErrorStateFilter::learn_inclinometer(const MotionEvidence& evidence) {
+  if (!evidence.against_inclinometer) return;
+  NoiseRatio& noise = memory_.inclinometer.of_motions;
+  noise.add(0.5 * *evidence.against_inclinometer * std::max(1.0, noise.factor()));
 }
 
 /// The step of the wheels since the last frame. None if they cannot tell.

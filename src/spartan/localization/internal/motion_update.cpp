@@ -95,6 +95,7 @@ bool ErrorStateFilter::update_by_motion(const VisualMotion& visual) {
                                                            motion.previous_from_current, covariance, visual.errors);
   const MotionEvidence evidence = evidence_of(visual, innovation);
   const MotionDecision decision = decide(evidence, gates_);
+  learn_inclinometer(evidence);
   const bool velocity_was_reset = std::exchange(vision.reset, false);
   if (decision.accept_doubted) accept_doubted_motion();
   vision.doubted = decision.use == MotionUse::doubt;
