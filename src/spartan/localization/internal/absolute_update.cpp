@@ -69,16 +69,19 @@ void ErrorStateFilter::initialize_compass_offset(const CompassSample& sample, do
   ++memory_.monitor(LocalizationSensor::compass).used;
 }
 
-double ErrorStateFilter::inclinometer_sigma(const InclinometerSample& sample) const {
-  return options_.inclinometer.noise_factor * std::max(sample.sigma_rad, options_.inclinometer.min_sigma_rad) *
-         std::sqrt(memory_.inclinometer.noise.factor());
+double ErrorStateFilter::stated_sigma(const InclinometerSample& sample) const {
+  return options_.inclinometer.noise_factor * std::max(sample.sigma_rad, options_.inclinometer.min_sigma_rad);
 }
 
 void ErrorStateFilter::update(const InclinometerSample& sample) {
   advance_to(sample.stamp);
   memory_.inclinometer.known = true;
   memory_.inclinometer.last = sample;
-  const double sigma = inclinometer_sigma(sample);
+  NoiseRatio& noise = memory_.inclinometer.noise;
+  const double stated = stated_sigma(sample);
+  // Without an IMU, the visual motions have measured the noise of the readings and the rocking between them.
+  const double factor = inertial_usable() ? noise.factor() : std::max(1.0, memory_.inclinometer.of_motions.factor());
+  const double sigma = stated * std::sqrt(factor);
   NavigationState& s = memory_.estimate.state;
   if (!memory_.gravity_known) {
     const Eigen::Vector3d up = s.world_from_body.rotation() * up_of_roll_pitch(sample.roll_rad, sample.pitch_rad);
@@ -91,8 +94,7 @@ void ErrorStateFilter::update(const InclinometerSample& sample) {
   const double nis = normalized_innovation_squared(memory_.estimate.covariance, innovation);
   const bool use = accept(LocalizationSensor::inclinometer, nis, 2, HealthReason::disagrees);
   if (use) {
-    NoiseRatio& noise = memory_.inclinometer.noise;
-    if (inertial_usable()) noise.add(memory_.estimate.covariance, innovation, sigma * sigma / noise.factor());
+    if (inertial_usable()) noise.add(memory_.estimate.covariance, innovation, stated * stated);
     correct_world(innovation);
   } else if (memory_.monitor(LocalizationSensor::inclinometer).state == SensorState::excluded) {
     memory_.estimate.covariance.diagonal().segment<2>(error_at::kInclinometerBias) +=

@@ -124,7 +124,7 @@ class ErrorStateFilter {
   void update(const CompassSample& sample);
   void initialize_compass_offset(const CompassSample& sample, double sigma_rad);
   void update(const InclinometerSample& sample);
-  double inclinometer_sigma(const InclinometerSample& sample) const;
+  double stated_sigma(const InclinometerSample& sample) const;
   void inflate_attitude(const Innovation& innovation);
   void update(const PoseConstraint& constraint);
   void update(const LateConstraint& constraint);

@@ -97,7 +97,7 @@ std::optional<double> ErrorStateFilter::compare_with_inclinometer(const VisualMo
   const Eigen::Vector3d measured = up_of_roll_pitch(now->roll_rad, now->pitch_rad),
                         seen = rotation.transpose() * up_of_roll_pitch(before.roll_rad, before.pitch_rad);
   const double age = seconds_between(before.stamp, motion.from) + seconds_between(now->stamp, motion.to);
-  const double variance = std::pow(inclinometer_sigma(before), 2) + std::pow(inclinometer_sigma(*now), 2) +
+  const double variance = std::pow(stated_sigma(before), 2) + std::pow(stated_sigma(*now), 2) +
                           std::pow(kRocking_rad_s * age, 2);
   const Eigen::Vector3d side = seen.unitOrthogonal();
   Eigen::Matrix<double, 2, 3> directions;
