@@ -239,7 +239,8 @@ TEST_F(Stops, OdometryOnlyGivesTheSameOdometry) {
   EXPECT_EQ(summary["absent"], nlohmann::json::parse(R"(["localization", "slam", "maps", "terrain"])"));
   EXPECT_TRUE(summary["health"]["localization"].empty());
   EXPECT_TRUE(maps_of("alone").empty());
-  for (const char* file : {"trajectory_slam.tum", "trajectory_localization.tum", "trajectory_smoothed.tum", "maps/global.tif"})
+  for (const char* file :
+       {"trajectory_slam.tum", "trajectory_localization.tum", "trajectory_smoothed.tum", "maps/global.tif"})
     EXPECT_FALSE(fs::exists(path("alone/") + file)) << file;
   EXPECT_TRUE(fs::exists(path("alone/report/index.html"))) << alone.err;
 

@@ -69,8 +69,8 @@ TEST(LocalizerWildMotion, OneIsRejectedWithAnyWitness) {
   }
 }
 
-// A compass or an inclinometer do not see it. No rover jumps by 0.5 m between steps of 0.15 m: the motion is used with its
-// size as standard deviation.
+// A compass or an inclinometer do not see it. No rover jumps by 0.5 m between steps of 0.15 m: the motion is used with
+// its size as standard deviation.
 TEST(LocalizerWildMotion, IsUncertainWithoutAWitness) {
   for (const TestSensors& sensors : {TestSensors{false, false, false, false}, TestSensors{false, false, true, false},
                                      TestSensors{false, false, false, true}, TestSensors{false, false, true, true}}) {

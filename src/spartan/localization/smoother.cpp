@@ -13,8 +13,8 @@ using namespace internal;
 
 namespace {
 
-/// Frames whose states are in memory at the same time (72 kB each). Only every such frame is kept from the pass forward;
-/// the pass backward makes those between again.
+/// Frames whose states are in memory at the same time (72 kB each). Only every such frame is kept from the pass
+/// forward; the pass backward makes those between again.
 constexpr std::size_t kFrames = 128;
 /// Added to the correlations of the state, which are singular where a clone is the pose itself.
 constexpr double kRidge = 1e-9;
@@ -45,8 +45,7 @@ StateEstimate smoothed(const Frame& frame, const StateEstimate& next, const Stat
   const ErrorVector later = error_between(next.state, smoothed_next.state);
   StateEstimate result;
   result.state = add_error(frame.at.state, frame.by_next.mean + gain * later);
-  result.covariance =
-      frame.by_next.covariance + gain * (smoothed_next.covariance - next.covariance) * gain.transpose();
+  result.covariance = frame.by_next.covariance + gain * (smoothed_next.covariance - next.covariance) * gain.transpose();
   symmetrize(result.covariance);
   return result;
 }

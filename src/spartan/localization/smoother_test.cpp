@@ -170,8 +170,7 @@ Errors errors_of(const TestSensors& sensors, int drives) {
       const UncertainPose filter = localizer.estimate_at(stamp_of_measurement(m))->world_from_body;
       const SmoothedPose& p = poses[++frame];
       EXPECT_EQ(p.stamp, stamp_of_measurement(m));
-      const Pose truth = first * drive.at(2.5).inverse() *
-                         drive.at(seconds_between(test_stamp(0), p.stamp));
+      const Pose truth = first * drive.at(2.5).inverse() * drive.at(seconds_between(test_stamp(0), p.stamp));
       const auto error = [&](const UncertainPose& of) { return log_se3(of.pose.inverse() * truth); };
       const auto nees = [&](const UncertainPose& of) { return error(of).dot(of.covariance.ldlt().solve(error(of))); };
       sum.filter_m2 += (filter.pose.translation() - truth.translation()).squaredNorm();

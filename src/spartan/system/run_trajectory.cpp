@@ -36,9 +36,8 @@ std::optional<UncertainPose> pose_of(const FrameRecord& frame, TrajectoryKind ki
 
 bool has_trajectory(const std::vector<FrameRecord>& frames, TrajectoryKind kind) {
   if (kind == TrajectoryKind::odometry) return true;
-  return std::any_of(frames.begin(), frames.end(), [kind](const FrameRecord& frame) {
-    return pose_of(frame, kind).has_value();
-  });
+  return std::any_of(frames.begin(), frames.end(),
+                     [kind](const FrameRecord& frame) { return pose_of(frame, kind).has_value(); });
 }
 
 Trajectory trajectory_of(const std::vector<FrameRecord>& frames, TrajectoryKind kind) {

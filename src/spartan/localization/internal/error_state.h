@@ -63,9 +63,9 @@ struct NavigationState {
 
 /// What later measurements say about the error at an earlier time (past_state.h).
 struct PastState {
-  ErrorVector mean = ErrorVector::Zero();                     ///< of the error at the earlier time
-  ErrorCovariance covariance = ErrorCovariance::Zero();       ///< of the error at the earlier time
-  ErrorCovariance with_present = ErrorCovariance::Zero();     ///< E[past error · present errorᵀ]
+  ErrorVector mean = ErrorVector::Zero();                  ///< of the error at the earlier time
+  ErrorCovariance covariance = ErrorCovariance::Zero();    ///< of the error at the earlier time
+  ErrorCovariance with_present = ErrorCovariance::Zero();  ///< E[past error · present errorᵀ]
 };
 
 /// Mean and covariance of the error.

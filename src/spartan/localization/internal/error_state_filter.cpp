@@ -180,8 +180,7 @@ void ErrorStateFilter::propagate_to(Stamp stamp, const ImuSample* next) {
 void ErrorStateFilter::propagate_inertially(double seconds, const ImuSample& from, const ImuSample& to) {
   const InertialStep step{from.gyro_rad_s, to.gyro_rad_s, from.accel_m_s2, to.accel_m_s2, seconds};
   const InertialNoise noise = inertial_noise(options_.imu, memory_.imu.noise);
-  propagate_covariance(memory_.estimate,
-                       transition(memory_.estimate.state, step, noise, options_.gravity_m_s2));
+  propagate_covariance(memory_.estimate, transition(memory_.estimate.state, step, noise, options_.gravity_m_s2));
   memory_.estimate.state = propagate(memory_.estimate.state, step, options_.gravity_m_s2);
 }
 

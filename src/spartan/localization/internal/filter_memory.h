@@ -43,8 +43,8 @@ struct InertialMemory {
 
 /// The visual motions that were used last, but for those of a stationary rover.
 struct RecentMotion {
-  std::uint32_t count = 0;  ///< as far as it matters
-  double length_m = 0;      ///< of the longest; fades
+  std::uint32_t count = 0;                                 ///< as far as it matters
+  double length_m = 0;                                     ///< of the longest; fades
   Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();  ///< of the last one, in the frame where it ended
   Stamp end;                                               ///< of the last one
 };
@@ -66,7 +66,7 @@ struct VisionMemory {
   Stamp doubted_at;
   Pose doubted_pose;
   bool has_wheels = false;
-  WheelSample wheels;                 ///< at clone_stamp
+  WheelSample wheels;  ///< at clone_stamp
   bool has_tilt = false;
   InclinometerSample tilt;            ///< the last one before clone_stamp, if it is fresh
   bool wheels_in_prediction = false;  ///< a step of the wheels since clone_stamp has corrected the motion

@@ -27,9 +27,9 @@ struct MotionEvidence {
   /// NIS of the rotation against two readings, 2 degrees of freedom; without a prediction by the IMU.
   std::optional<double> against_inclinometer;
   std::optional<ForwardComparison> forward;  ///< where IMU and wheels can tell the distance
-  bool follows_doubted = false;              ///< the motion before was rejected as wild, and ended where this one begins
-  bool keeps_reference = false;              ///< the next motion begins where this one does, and contains it
-  bool is_implausible = false;               ///< far off what the motions before it predict
+  bool follows_doubted = false;  ///< the motion before was rejected as wild, and ended where this one begins
+  bool keeps_reference = false;  ///< the next motion begins where this one does, and contains it
+  bool is_implausible = false;   ///< far off what the motions before it predict
 };
 
 enum class MotionUse : std::uint8_t {
@@ -51,8 +51,8 @@ struct MotionDecision {
 
 /// Thresholds of normalized innovations squared.
 struct MotionGates {
-  double vision = 0;                        ///< of vision against the IMU, 6 degrees of freedom
-  std::array<double, 7> by_rows{};          ///< of the other sensors, by degrees of freedom
+  double vision = 0;                ///< of vision against the IMU, 6 degrees of freedom
+  std::array<double, 7> by_rows{};  ///< of the other sensors, by degrees of freedom
 };
 
 /// Decides by a table, from the first line that applies:
@@ -69,9 +69,9 @@ struct MotionGates {
 ///
 /// Witnesses of a wild motion: the count of the wheels; the prediction by the IMU, unless the wheels agree with the
 /// motion; without an IMU, the distance predicted with the wheels, if their count alone cannot tell, and the change of
-/// the inclinometer's readings. (A compass is no witness: its outliers are larger than the error of a motion.) A motion that
-/// follows a doubted one and is contradicted, too, proves that the doubted one was right. Vision that is excluded is
-/// never doubted, nor is a motion that the next one contains.
+/// the inclinometer's readings. (A compass is no witness: its outliers are larger than the error of a motion.) A motion
+/// that follows a doubted one and is contradicted, too, proves that the doubted one was right. Vision that is excluded
+/// is never doubted, nor is a motion that the next one contains.
 MotionDecision decide(const MotionEvidence& evidence, const MotionGates& gates);
 
 /// What a contradiction of vision means for an IMU that was suspect: how its monitor goes on after a motion inside the

@@ -13,9 +13,9 @@ namespace {
 /// The IMU and the wheels agree where they differ by fewer standard deviations, and vision contradicts the IMU where it
 /// differs by more.
 constexpr double kAgreeSigmas = 3;
-/// A motion is implausible where it differs from all that a speed between zero and the last one can explain by more than
-/// this multiple of the recent length (a reversal: twice) and this length. The length fades by kLengthFades with each
-/// motion; it is known after kRecentMotions.
+/// A motion is implausible where it differs from all that a speed between zero and the last one can explain by more
+/// than this multiple of the recent length (a reversal: twice) and this length. The length fades by kLengthFades with
+/// each motion; it is known after kRecentMotions.
 constexpr double kImplausibleFactor = 2, kImplausible_m = 0.1, kLengthFades = 0.9;
 constexpr std::uint32_t kRecentMotions = 3;
 /// Maximum age of a reading of the inclinometer at a frame; angular rate of a rocking rover in the time between.
@@ -97,14 +97,15 @@ std::optional<double> ErrorStateFilter::compare_with_inclinometer(const VisualMo
   const Eigen::Vector3d measured = up_of_roll_pitch(now->roll_rad, now->pitch_rad),
                         seen = rotation.transpose() * up_of_roll_pitch(before.roll_rad, before.pitch_rad);
   const double age = seconds_between(before.stamp, motion.from) + seconds_between(now->stamp, motion.to);
-  const double variance = std::pow(stated_sigma(before), 2) + std::pow(stated_sigma(*now), 2) +
-                          std::pow(kRocking_rad_s * age, 2);
+  const double variance =
+      std::pow(stated_sigma(before), 2) + std::pow(stated_sigma(*now), 2) + std::pow(kRocking_rad_s * age, 2);
   const Eigen::Vector3d side = seen.unitOrthogonal();
   Eigen::Matrix<double, 2, 3> directions;
   directions << side.transpose(), seen.cross(side).transpose();
   const Eigen::Matrix<double, 2, 3> by_rotation = directions * skew(seen);
-  const Eigen::Matrix2d covariance = by_rotation * motion.covariance.bottomRightCorner<3, 3>() * by_rotation.transpose() +
-                                     variance * Eigen::Matrix2d::Identity();
+  const Eigen::Matrix2d covariance =
+      by_rotation * motion.covariance.bottomRightCorner<3, 3>() * by_rotation.transpose() +
+      variance * Eigen::Matrix2d::Identity();
   const Eigen::Vector2d residual = directions * (measured - seen);
   return residual.dot(covariance.ldlt().solve(residual)) / std::max(1.0, memory_.inclinometer.of_motions.factor());
 }

@@ -8,8 +8,8 @@
 namespace spartan::internal {
 
 /// Variance of the readings of a sensor over the stated one, by the innovations r of readings that were used (Mehra,
-/// *Approaches to adaptive filtering*, 1972): the mean of (r² − H P Hᵀ) / R over the last readings, where the first ones
-/// count with the stated value.
+/// *Approaches to adaptive filtering*, 1972): the mean of (r² − H P Hᵀ) / R over the last readings, where the first
+/// ones count with the stated value.
 class NoiseRatio {
  public:
   /// Variance by which a stated one is multiplied.

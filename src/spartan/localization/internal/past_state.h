@@ -1,8 +1,8 @@
 // The state at an earlier time beside the present one: the joint distribution that a fixed-interval smoother needs.
 //
 // With the cross-covariance X = E[past error · present errorᵀ], whatever changes the present error linearly, δ' = A δ +
-// noise, changes X to X Aᵀ, and a measurement of the present corrects the past with the gain X Hᵀ S⁻¹. All functions that
-// change a StateEstimate do so to its `past`, if it has one.
+// noise, changes X to X Aᵀ, and a measurement of the present corrects the past with the gain X Hᵀ S⁻¹. All functions
+// that change a StateEstimate do so to its `past`, if it has one.
 #pragma once
 
 #include "spartan/localization/internal/error_state.h"

@@ -81,9 +81,8 @@ TEST(PastState, IsCorrectedByNoiseThatThePoseShares) {
   const StateEstimate before = estimate_with_past(random);
   Innovation i = random_innovation(random, 3);
   const Eigen::MatrixXd of_pose = 0.05 * random_matrix(random, 6, 3);
-  const Eigen::MatrixXd shared =
-      joint_of(before).middleCols<6>(kSize + error_at::kPose) *
-      before.covariance.block<6, 6>(error_at::kPose, error_at::kPose).ldlt().solve(of_pose);
+  const Eigen::MatrixXd shared = joint_of(before).middleCols<6>(kSize + error_at::kPose) *
+                                 before.covariance.block<6, 6>(error_at::kPose, error_at::kPose).ldlt().solve(of_pose);
   i.shared = shared.bottomRows<kSize>();
   StateEstimate after = before;
   ASSERT_TRUE(correct(after, i));

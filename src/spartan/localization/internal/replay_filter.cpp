@@ -27,8 +27,7 @@ double age(const Measurement& m, Stamp newest) {
 
 }  // namespace
 
-ReplayFilter::ReplayFilter(const LocalizationOptions& options)
-    : options_(options), order_(options), filter_(options) {}
+ReplayFilter::ReplayFilter(const LocalizationOptions& options) : options_(options), order_(options), filter_(options) {}
 
 void ReplayFilter::start(Stamp stamp, const Eigen::Vector3d& ahead_in_body,
                          const std::optional<Eigen::Vector3d>& up_in_body, const Eigen::Vector3d& assumed_up_in_body) {
@@ -105,8 +104,9 @@ void ReplayFilter::undo_leap(Stamp arrived) {
 }
 
 std::optional<std::size_t> ReplayFilter::place(const Measurement& m) {
-  const auto at = std::lower_bound(entries_.begin(), entries_.end(), m,
-                                   [this](const Measurement& a, const Measurement& b) { return order_.precedes(a, b); });
+  const auto at =
+      std::lower_bound(entries_.begin(), entries_.end(), m,
+                       [this](const Measurement& a, const Measurement& b) { return order_.precedes(a, b); });
   if (at != entries_.end() && !order_.precedes(m, *at)) return std::nullopt;
   const auto index = static_cast<std::size_t>(at - entries_.begin());  // insert() invalidates the iterator
   entries_.insert(at, m);
@@ -143,7 +143,8 @@ std::optional<ErrorStateFilter> ReplayFilter::at(Stamp stamp) const {
     filter.set_memory(from.memory);
     first = from.count;
   }
-  for (std::size_t i = first; i < entries_.size() && order_.turn_of(entries_[i]) <= stamp; ++i) filter.process(entries_[i]);
+  for (std::size_t i = first; i < entries_.size() && order_.turn_of(entries_[i]) <= stamp; ++i)
+    filter.process(entries_[i]);
   filter.predict_to(stamp);
   return filter;
 }
