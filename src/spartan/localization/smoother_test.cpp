@@ -61,7 +61,7 @@ TEST(Smoother, SpreadsALateConstraintOverTheDrive) {
 
 std::vector<SmoothedPose> smoothed(const LocalizationOptions& options, const std::vector<Measurement>& all) {
   Smoother smoother = Smoother::create(options).value();
-  for (auto m = all.rbegin(); m != all.rend(); ++m) smoother.add(*m);  // the order does not matter
+  for (const Measurement& m : std::vector<Measurement>(all.rbegin(), all.rend())) smoother.add(m);  // in any order
   smoother.start({test_stamp(2.5), Eigen::Vector3d::UnitX(), {}});
   return smoother.smooth();
 }
