@@ -61,7 +61,6 @@ DELETE FROM localization WHERE seq > (SELECT frames FROM counts);
 DELETE FROM slam WHERE seq > (SELECT frames FROM counts);
 DELETE FROM health WHERE seq > (SELECT frames FROM counts);
 DELETE FROM localization_inputs WHERE seq > (SELECT frames FROM counts);
-DELETE FROM smoothed;
 DELETE FROM terrain WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
   SELECT stamp_ns FROM terrain ORDER BY stamp_ns LIMIT (SELECT terrain FROM counts));
 DELETE FROM maps WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
@@ -223,6 +222,8 @@ Status RunStore::State::commit(const std::function<Status()>& write) {
 Status RunStore::State::write(const Step& step) {
   if (step.frame) {
     if (Status s = write(*step.frame); !s) return s;
+    // Of a run that ended here before.
+    if (Status s = db.execute("DELETE FROM smoothed"); !s) return s;
   }
   if (step.terrain) {
     if (Status s = write(*step.terrain); !s) return s;

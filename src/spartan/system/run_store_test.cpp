@@ -191,6 +191,43 @@ TEST(RunStore, ResumesFromTheLatestCheckpoint) {
   EXPECT_EQ(store->frames()->back().localization->sensors.size(), 2U);
 }
 
+TEST(RunStore, KeepsTheInputsOfTheLocalizationAndTheSmoothedPoses) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/run.sqlite";
+  const auto save = [] { return Bytes{1}; };
+  const UncertainPose pose = some_frame(1).world_from_body;
+  {
+    auto store = RunStore::create(path, kIdentity);
+    ASSERT_TRUE(store) << store.error().message();
+    ASSERT_TRUE(store->commit({some_frame(0), {}, {}, {}, {1, 2}}, save, {1, 0}));
+    ASSERT_TRUE(store->commit({some_frame(1), {}, {}, {}, {3}}, save, {2, 0}));
+    ASSERT_TRUE(store->commit_smoothed({std::nullopt, pose}));
+    ASSERT_TRUE(store->commit({{}, {}, some_map(0), {}, {4, 5, 6}}, save, {3, 0}));
+  }
+  const auto check = [&](RunStore& store) {
+    EXPECT_EQ(store.localization_inputs().value(), (std::vector<Bytes>{{1, 2}, {3}, {4, 5, 6}}));
+    const auto frames = store.frames();
+    ASSERT_TRUE(frames);
+    EXPECT_FALSE(frames->front().smoothed);
+    ASSERT_TRUE(frames->back().smoothed);
+    EXPECT_EQ(frames->back().smoothed->pose.matrix(), pose.pose.matrix());
+    EXPECT_EQ(frames->back().smoothed->covariance, pose.covariance);
+  };
+  auto reader = RunStore::open_read_only(path);
+  ASSERT_TRUE(reader) << reader.error().message();
+  check(*reader);
+  auto store = RunStore::resume(path, kIdentity);
+  ASSERT_TRUE(store) << store.error().message();
+  check(*store);
+  // A run that goes on is not smoothed until its end; inputs after the checkpoint are removed with their frames.
+  ASSERT_TRUE(store->commit({some_frame(2), {}, {}, {}, {7}}));
+  EXPECT_FALSE(store->frames()->at(1).smoothed);
+  EXPECT_EQ(store->localization_inputs()->size(), 4U);
+  store = RunStore::resume(path, kIdentity);
+  ASSERT_TRUE(store) << store.error().message();
+  EXPECT_EQ(store->localization_inputs()->size(), 3U);
+}
+
 TEST(RunStore, StartsAgainWithoutACheckpoint) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
