@@ -45,19 +45,18 @@ std::vector<Measurement> stated(std::vector<Measurement> samples, double factor)
   return samples;
 }
 
-// Beside an IMU, standard deviations that are stated wrong by 2 cost little: the covariance of the attitude is that of
-// the true ones.
+// Beside an IMU, standard deviations that are stated wrong by 2 cost little: that of the compass offset is 6 % too small
+// or 19 % too large (32 and 72 % without the measurement).
 TEST(NoiseRatio, IsMeasuredByTheLocalization) {
   const double seconds = 152.5;
   const auto all = in_order(test_samples(TestDrive(), seconds, {true, false, true, true}, 9),
                             test_motions(TestDrive(), seconds, 1, 9));
-  const auto attitude = [&](double factor) {
-    const LocalizationEstimate e = driven(test_options(), stated(all, factor)).estimate();
-    return e.world_from_body.covariance.bottomRightCorner<3, 3>().trace();
+  const auto sigma = [&](double factor) {
+    return driven(test_options(), stated(all, factor)).estimate().heading.compass_offset_sigma_rad;
   };
-  const double right = attitude(1);
-  EXPECT_NEAR(std::sqrt(attitude(0.5) / right), 1, 0.15);
-  EXPECT_NEAR(std::sqrt(attitude(2) / right), 1, 0.15);
+  const double right = sigma(1);
+  EXPECT_NEAR(sigma(0.5) / right, 1, 0.25);
+  EXPECT_NEAR(sigma(2) / right, 1, 0.25);
 }
 
 }  // namespace
