@@ -242,7 +242,17 @@ void ErrorStateFilter::preserve_odom(const Pose& world_from_body_before) {
 
 // odom_from_body becomes its value at the clone times the corrected motion since.
 void ErrorStateFilter::correct_motion(const Innovation& innovation, int clone) {
-  if (!correct(memory_.estimate, innovation)) return;
+  if (correct(memory_.estimate, innovation)) set_odom_by_motion(clone);
+}
+
+// Pose and velocity only: between two frames without an IMU, wheels say nothing about errors that vision measures.
+void ErrorStateFilter::correct_prediction(const Innovation& innovation) {
+  constexpr int kFirst = error_at::kGyroBias;
+  if (correct_all_but(memory_.estimate, innovation, kFirst, error_at::kSize - kFirst))
+    set_odom_by_motion(error_at::kStepClone);
+}
+
+void ErrorStateFilter::set_odom_by_motion(int clone) {
   const NavigationState& s = memory_.estimate.state;
   const Pose odom_from_body =
       (clone == error_at::kVisionClone ? memory_.vision.odom_from_clone : memory_.step.odom_from_clone) *

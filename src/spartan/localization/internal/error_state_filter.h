@@ -135,6 +135,8 @@ class ErrorStateFilter {
   void correct_by_map(const Innovation& innovation);
   void preserve_odom(const Pose& world_from_body_before);
   void correct_motion(const Innovation& innovation, int clone);
+  void correct_prediction(const Innovation& innovation);
+  void set_odom_by_motion(int clone);
   bool accept(LocalizationSensor sensor, double nis, int rows, HealthReason why);
 
   LocalizationOptions options_;

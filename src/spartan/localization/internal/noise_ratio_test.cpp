@@ -45,8 +45,8 @@ std::vector<Measurement> stated(std::vector<Measurement> samples, double factor)
   return samples;
 }
 
-// Beside an IMU, standard deviations that are stated wrong by 2 cost little: that of the compass offset is 6 % too small
-// or 19 % too large (32 and 72 % without the measurement).
+// Beside an IMU, standard deviations that are stated wrong by 2 cost little: that of the compass offset is 6 % too
+// small or 19 % too large (32 and 72 % without the measurement).
 TEST(NoiseRatio, IsMeasuredByTheLocalization) {
   const double seconds = 152.5;
   const auto all = in_order(test_samples(TestDrive(), seconds, {true, false, true, true}, 9),

@@ -97,6 +97,8 @@ void ErrorStateFilter::update_by_step(const WheelSample& sample) {
     const double variance = known.jacobian * memory_.estimate.covariance * known.jacobian.transpose();
     if (variance < std::pow(kKnownRatio * step.forward_sigma_m, 2)) {
       correct_only(memory_.estimate, forward, error_at::kWheelScale);
+    } else if (memory_.vision.constant_velocity_s > 0) {
+      correct_prediction(whole);
     } else {
       correct_motion(whole, error_at::kStepClone);
     }

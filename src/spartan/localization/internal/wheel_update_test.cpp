@@ -60,6 +60,22 @@ TEST(WheelUpdate, DifferenceOfTheWheelsIsARotation) {
   }
 }
 
+// Between frames, without an IMU, the steps of the wheels predict the pose; vision then replaces the prediction, and
+// nothing of it is left.
+TEST(WheelUpdate, LeavesNothingBehindWhereVisionMeasures) {
+  LocalizationOptions options = test_options();
+  options.wheels.max_step_s = 0.5;
+  const double seconds = 62.5;
+  const auto motions = test_motions(TestDrive(), seconds, 1, 4);
+  const auto end = [&](bool wheels) {
+    const auto samples = test_samples(TestDrive(), seconds, {false, wheels, false, false}, 4);
+    return driven(options, in_order(samples, motions)).estimate_at(test_stamp(seconds))->world_from_body;
+  };
+  const UncertainPose with = end(true), without = end(false);
+  EXPECT_LT(log_se3(with.pose.inverse() * without.pose).norm(), 1e-12);
+  EXPECT_LT((with.covariance - without.covariance).norm(), 1e-9 * without.covariance.norm());
+}
+
 TEST(WheelUpdate, RotationIsAsUncertainAsTheWheels) {
   TestDrive straight = flat_drive();
   straight.swing_m = 0;
