@@ -297,7 +297,7 @@ class Smoother {
   /// Both, by Localizer::take_inputs. Codes as Localizer::restore.
   Status add(const Bytes& inputs);
   /// At the start and at every visual motion after it, in order of time; nothing without a start.
-  std::vector<SmoothedPose> smooth() const;
+  std::vector<SmoothedPose> smooth();
 
  private:
   struct State;

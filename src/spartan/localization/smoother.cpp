@@ -18,8 +18,6 @@ namespace {
 constexpr std::size_t kFrames = 128;
 /// Added to the correlations of the state, which are singular where a clone is the pose itself.
 constexpr double kRidge = 1e-9;
-/// Samples before the start that count for its alignment, as in ReplayFilter.
-constexpr double kBeforeStart_s = 10;
 
 /// A frame with all measurements up to it, and the joint distribution with the next one.
 struct Frame {
@@ -74,12 +72,19 @@ class Pass {
   Pass(const LocalizationOptions& options, const MeasurementLog& log) : filter_(options), log_(&log) {}
 
   void start(const LocalizationStart& start) {
-    std::vector<Measurement> before;
-    for (; next_ < log_->size() && stamp_of_measurement((*log_)[next_]) <= start.stamp; ++next_) {
+    // Samples of the IMU from after the start may have their turn before it.
+    std::vector<Measurement> before, after;
+    for (; next_ < log_->size() && log_->turn(next_) <= start.stamp; ++next_) {
       const Measurement m = (*log_)[next_];
-      if (seconds_between(stamp_of_measurement(m), start.stamp) <= kBeforeStart_s) before.push_back(m);
+      const double age_s = seconds_between(stamp_of_measurement(m), start.stamp);
+      if (age_s < 0) {
+        after.push_back(m);
+      } else if (age_s <= kBeforeStart_s) {
+        before.push_back(m);
+      }
     }
     filter_.start(start.stamp, start.ahead_in_body, before, start.up_in_body, start.assumed_up_in_body);
+    for (const Measurement& m : after) filter_.process(m);
   }
 
   Place place() const { return {next_, filter_.memory()}; }
@@ -137,11 +142,10 @@ Status Smoother::add(const Bytes& inputs) {
   return {};
 }
 
-std::vector<SmoothedPose> Smoother::smooth() const {
+std::vector<SmoothedPose> Smoother::smooth() {
   if (!state_->start) return {};
-  MeasurementLog log = state_->log;
-  log.sort();
-  Pass pass(state_->options, log);
+  state_->log.sort();
+  Pass pass(state_->options, state_->log);
   pass.start(*state_->start);
   std::vector<Pass::Place> places{pass.place()};
   std::size_t frames = 1;

@@ -74,6 +74,21 @@ TEST(Smoother, EndsAtTheEstimateOfTheFilter) {
   EXPECT_LT((poses.back().world_from_body.covariance - filter.covariance).norm(), 1e-3 * filter.covariance.norm());
 }
 
+// A compass at the very start comes after samples of the IMU whose stamps are later, because they may be needed earlier.
+TEST(Smoother, BeginsAsTheLocalizerDoes) {
+  const auto all = test_samples(TestDrive(), 5, {}, 3);
+  Localizer localizer = Localizer::create(test_options()).value();
+  Smoother smoother = Smoother::create(test_options()).value();
+  for (const Measurement& m : all) {
+    smoother.add(m);
+    if (stamp_of_measurement(m) <= test_stamp(2)) localizer.add(m);
+  }
+  localizer.start(test_stamp(2), Eigen::Vector3d::UnitX());
+  smoother.start({test_stamp(2), Eigen::Vector3d::UnitX(), {}});
+  const Pose smoothed_start = smoother.smooth().front().world_from_body.pose;
+  EXPECT_LT(log_se3(smoothed_start.inverse() * localizer.estimate().world_from_body.pose).norm(), 1e-5);
+}
+
 bool same(const UncertainPose& a, const UncertainPose& b) {
   return log_se3(a.pose.inverse() * b.pose).norm() == 0 && (a.covariance - b.covariance).norm() == 0;
 }

@@ -319,8 +319,7 @@ std::vector<StageTime> Pipeline::take_stage_times() {
 }
 
 Bytes Pipeline::take_localization_inputs() {
-  const RunOptions& o = state_->options;
-  return o.smoothed_trajectory && !o.odometry_only ? state_->localizer.take_inputs() : Bytes();
+  return state_->localizer.take_inputs();
 }
 
 void Pipeline::store_maps_in(TileStore& store) {

@@ -1,6 +1,7 @@
 #include "spartan/localization/internal/measurement_log.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace spartan::internal {
 
@@ -24,25 +25,12 @@ void MeasurementLog::sort() {
 
 Measurement MeasurementLog::operator[](std::size_t index) const {
   const Entry& e = entries_[index];
-  const auto of = [&]<std::size_t kind>(std::integral_constant<std::size_t, kind>) -> Measurement {
-    return std::get<kind>(samples_)[e.place];
+  Measurement measurement;
+  const auto take = [&]<std::size_t... kind>(std::index_sequence<kind...>) {
+    ((e.kind == kind ? static_cast<void>(measurement = std::get<kind>(samples_)[e.place]) : void()), ...);
   };
-  switch (e.kind) {
-    case 0:
-      return of(std::integral_constant<std::size_t, 0>{});
-    case 1:
-      return of(std::integral_constant<std::size_t, 1>{});
-    case 2:
-      return of(std::integral_constant<std::size_t, 2>{});
-    case 3:
-      return of(std::integral_constant<std::size_t, 3>{});
-    case 4:
-      return of(std::integral_constant<std::size_t, 4>{});
-    case 5:
-      return of(std::integral_constant<std::size_t, 5>{});
-    default:
-      return of(std::integral_constant<std::size_t, 6>{});
-  }
+  take(std::make_index_sequence<std::variant_size_v<Measurement>>{});
+  return measurement;
 }
 
 }  // namespace spartan::internal

@@ -34,7 +34,7 @@ struct MotionEvidence {
 
 enum class MotionUse : std::uint8_t {
   correct,  ///< correct the prediction
-  reset,    ///< correct the prediction without giving it weight: vision contradicts the IMU and is believed
+  reset,    ///< correct the prediction without giving it weight: vision contradicts the IMU, which is wrong
   follow,   ///< replace the pose: there is no prediction by an IMU
   reject,   ///< coast on the prediction
   doubt,    ///< the same, until the next motion tells whether this one was right

@@ -10,6 +10,9 @@
 
 namespace spartan::internal {
 
+/// Samples from so long before the start count for its alignment.
+inline constexpr double kBeforeStart_s = 10;
+
 /// By stamps, then by kind; a sample of the IMU comes earlier by InertialOptions::max_time_error_s, because it may be
 /// needed that long before its stamp.
 class ProcessingOrder {

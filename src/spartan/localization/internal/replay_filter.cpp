@@ -12,8 +12,6 @@ namespace {
 /// Snapshots are taken where time crosses a multiple of this, so that they depend on the samples only, not on the order
 /// of their arrival.
 constexpr std::int64_t kCell_ns = 500'000'000;
-/// Samples before the start that are kept for static alignment.
-constexpr double kBeforeStart_s = 10;
 /// A stamp may be ahead of all others by this, or by the length of the buffer if that is longer.
 constexpr double kMinLead_s = 5;
 
