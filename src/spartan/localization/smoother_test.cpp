@@ -76,9 +76,11 @@ TEST(Smoother, EndsAtTheEstimateOfTheFilter) {
 
 // A compass at the very start comes after samples of the IMU whose stamps are later, because they may be needed earlier.
 TEST(Smoother, BeginsAsTheLocalizerDoes) {
+  LocalizationOptions options = test_options();
+  options.imu.time_offset_sigma_s = 0.02;
   const auto all = test_samples(TestDrive(), 5, {}, 3);
-  Localizer localizer = Localizer::create(test_options()).value();
-  Smoother smoother = Smoother::create(test_options()).value();
+  Localizer localizer = Localizer::create(options).value();
+  Smoother smoother = Smoother::create(options).value();
   for (const Measurement& m : all) {
     smoother.add(m);
     if (stamp_of_measurement(m) <= test_stamp(2)) localizer.add(m);
