@@ -20,6 +20,8 @@
 namespace spartan {
 namespace {
 
+/// An attitude by gyros does not change by itself within a second, the error of one pose of the ground truth does.
+constexpr std::size_t kTiltWindow_frames = 20;
 constexpr double kDegrees = 180 / std::numbers::pi;
 
 /// The visual motions of one trial, body frame.
@@ -70,7 +72,7 @@ struct Sensors {
 struct FrameResult {
   double time_s = 0, position_m = 0, sigma_m = 0, attitude_deg = 0, heading_deg = 0;
   double nees_position = 0, nees_pose = 0;
-  double up_deg = 0;  ///< error of roll and pitch
+  Eigen::Vector2d up_error_deg = Eigen::Vector2d::Zero();  ///< error of roll and pitch, as a tilt in the true world
   LocalizationEstimate estimate;
 };
 
@@ -134,7 +136,9 @@ DriveResult localize(const RealDrive& d, const std::vector<RelativeMotion>& moti
     f.nees_pose = error.dot(estimate.covariance.ldlt().solve(error));
     const Eigen::Vector3d up_here = estimate.pose.rotation().conjugate() * f.estimate.up_in_world,
                           true_up = d.frames[frame].pose.rotation().conjugate() * Eigen::Vector3d::UnitZ();
-    f.up_deg = kDegrees * std::acos(std::clamp(up_here.dot(true_up), -1.0, 1.0));
+    const Eigen::Vector3d in_world = d.frames[frame].pose.rotation() * up_here;
+    const double tilt = std::acos(std::clamp(up_here.dot(true_up), -1.0, 1.0)), length = in_world.head<2>().norm();
+    if (length > 0) f.up_error_deg = kDegrees * tilt / length * in_world.head<2>();
     const Eigen::Vector3d ahead = d.body_from_left.rotation() * Eigen::Vector3d::UnitZ();
     const Eigen::Vector3d a = ours.rotation() * ahead, b = truth.rotation() * ahead;
     const Eigen::Vector3d axis = first.inverse().rotation() * f.estimate.up_in_world;
@@ -162,27 +166,44 @@ std::string gyro_bias_text(const RealDrive& d, const FrameResult& f) {
                   : fmt::format("({:.2f}), {:.2f}", 1e3 * b.gyro_rad_s.norm(), sigma);
 }
 
-void print_result(const RealDrive& d, int seed, const Sensors& sensors, const DriveResult& r) {
-  constexpr double kAfter_s = 5;
-  double squares = 0, up_squares = 0;
-  std::vector<double> up;
-  const FrameResult *end = &r.frames.back(), *after = end;
-  for (const FrameResult& f : r.frames) {
-    squares += f.position_m * f.position_m;
-    if (f.time_s < kAfter_s - 0.01) continue;
-    if (up.empty()) after = &f;
-    up.push_back(f.up_deg);
-    up_squares += f.up_deg * f.up_deg;
+/// Errors of roll and pitch from 5 s on, degrees: RMS, 95 %, largest.
+std::string tilt_text(const std::vector<FrameResult>& frames, double after_s, std::size_t half_window) {
+  std::vector<double> errors;
+  double squares = 0;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].time_s < after_s) continue;
+    const std::size_t first = i < half_window ? 0 : i - half_window,
+                      last = std::min(i + half_window, frames.size() - 1);
+    Eigen::Vector2d error;
+    for (int axis = 0; axis < 2; ++axis) {
+      std::vector<double> near;
+      for (std::size_t k = first; k <= last; ++k) near.push_back(frames[k].up_error_deg[axis]);
+      std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2), near.end());
+      error[axis] = near[near.size() / 2];
+    }
+    errors.push_back(error.norm());
+    squares += error.squaredNorm();
   }
-  if (up.empty()) up = {0};
-  std::sort(up.begin(), up.end());
+  if (errors.empty()) return "";
+  std::sort(errors.begin(), errors.end());
+  return fmt::format("{:.3f}, {:.3f}, {:.3f}", std::sqrt(squares / static_cast<double>(errors.size())),
+                     errors[errors.size() * 95 / 100], errors.back());
+}
+
+void print_result(const RealDrive& d, int seed, const Sensors& sensors, const DriveResult& r) {
+  constexpr double kAfter_s = 5 - 0.01;
+  double squares = 0;
+  for (const FrameResult& f : r.frames) squares += f.position_m * f.position_m;
+  const FrameResult* const end = &r.frames.back();
+  const auto first_after =
+      std::find_if(r.frames.begin(), r.frames.end(), [](const FrameResult& f) { return f.time_s >= kAfter_s; });
+  const FrameResult& after = first_after == r.frames.end() ? *end : *first_after;
   fmt::print(
-      "| {} | vision{}{} | {:.1f}, {:.1f} | {:.1f} | {:.3f}, {:.3f} | {:.3f}, {:.3f}, {:.3f} | {} | {} | {} | {:.2f}, "
-      "{:.2f} |\n",
+      "| {} | vision{}{} | {:.1f}, {:.1f} | {:.1f} | {:.3f}, {:.3f} | {} | {} | {} | {} | {} | {:.2f}, {:.2f} |\n",
       seed, sensors.imu ? "+imu" : "", sensors.wheels ? "+wheels" : "",
       1e3 * std::sqrt(squares / static_cast<double>(r.frames.size())), 1e3 * end->position_m, 1e3 * end->sigma_m,
-      end->attitude_deg, end->heading_deg, std::sqrt(up_squares / static_cast<double>(up.size())),
-      up[up.size() * 95 / 100], up.back(), sensors.imu ? gyro_bias_text(d, *after) : "",
+      end->attitude_deg, end->heading_deg, tilt_text(r.frames, kAfter_s, 0),
+      tilt_text(r.frames, kAfter_s, kTiltWindow_frames / 2), sensors.imu ? gyro_bias_text(d, after) : "",
       sensors.imu ? fmt::format("{:.2f}, {:.2f}", 1e3 * end->estimate.imu_time_offset_s,
                                 1e3 * end->estimate.imu_time_offset_sigma_s)
                   : "",
@@ -199,10 +220,13 @@ void print_drive(const RealDrive& d, const OdometryErrors& errors, int seeds, co
       1e3 * odometry[0], 1e3 * odometry[1], 1e3 * odometry[2], 1e3 * odometry[3], 1e3 * odometry[4], 1e3 * odometry[5],
       1e3 * d.truth_sigma_m, 1e3 * d.truth_sigma_rad);
   fmt::print(
-      "Roll and pitch, gyro bias: after 5 s. Gyro bias: difference to the reference, or the estimate in brackets.\n\n"
+      "Roll and pitch, gyro bias: after 5 s. Gyro bias: difference to the reference, or the estimate in brackets. "
+      "Median: of the error of roll and of pitch over {} frames.\n\n"
       "| seed | sensors | ATE, end, mm | 1 sigma | attitude, heading at the end, deg | roll and pitch, RMS, 95 %, "
-      "largest, deg | gyro bias, 1 sigma, mrad/s | clock of the IMU, 1 sigma, ms | IMU not ok, frames | mean NEES "
-      "position, pose |\n|---|---|---|---|---|---|---|---|---|---|\n");
+      "largest, deg | the same of the median, deg | gyro bias, 1 sigma, mrad/s | clock of the IMU, 1 sigma, ms | IMU "
+      "not ok, frames | mean NEES "
+      "position, pose |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
+      kTiltWindow_frames);
   for (int seed = 1; seed <= seeds; ++seed) {
     const auto motions = vision(d, errors, static_cast<std::uint64_t>(seed));
     for (const Sensors& sensors : {Sensors{false, false}, with})

@@ -121,6 +121,11 @@ struct FilterMemory {
   InclinometerMemory inclinometer;
   std::array<SensorMonitor, kLocalizationSensors> monitors;
 
+  /// Whether the IMU predicts the motion.
+  bool inertial_usable() const {
+    return imu.known && imu.aligned && monitor(LocalizationSensor::imu).state != SensorState::excluded;
+  }
+
   SensorMonitor& monitor(LocalizationSensor sensor) { return monitors[static_cast<std::size_t>(sensor)]; }
   const SensorMonitor& monitor(LocalizationSensor sensor) const { return monitors[static_cast<std::size_t>(sensor)]; }
 };

@@ -1,5 +1,5 @@
 // Each line of the table of decide(), and each condition that a line depends on.
-#include "spartan/localization/internal/motion_decision.h"
+#include "spartan/localization/internal/updates/motion_decision.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "spartan/localization/internal/motion_decision.h"
+#include "spartan/localization/internal/updates/motion_decision.h"
 
 #include <algorithm>
 

@@ -48,7 +48,7 @@ TestDrive flat_drive() {
 }
 
 // Steps of two samples end at 3.5 s, 4.5 s …
-TEST(WheelUpdate, DifferenceOfTheWheelsIsARotation) {
+TEST(LocalizerWheels, DifferenceOfTheWheelsIsARotation) {
   const TestDrive drive = flat_drive();
   for (const double seconds : {4.5, 12.5, 44.5}) {
     LocalizationOptions options = wheel_options();
@@ -62,7 +62,7 @@ TEST(WheelUpdate, DifferenceOfTheWheelsIsARotation) {
 
 // Between frames, without an IMU, the steps of the wheels predict the pose; vision then replaces the prediction, and
 // nothing of it is left.
-TEST(WheelUpdate, LeavesNothingBehindWhereVisionMeasures) {
+TEST(LocalizerWheels, LeavesNothingBehindWhereVisionMeasures) {
   const TestDrive drive;
   const double seconds = 60;
   std::vector<Measurement> motions;
@@ -82,7 +82,7 @@ TEST(WheelUpdate, LeavesNothingBehindWhereVisionMeasures) {
   EXPECT_LT((with.covariance - without.covariance).norm(), 1e-12 * without.covariance.norm());
 }
 
-TEST(WheelUpdate, RotationIsAsUncertainAsTheWheels) {
+TEST(LocalizerWheels, RotationIsAsUncertainAsTheWheels) {
   TestDrive straight = flat_drive();
   straight.swing_m = 0;
   const LocalizationOptions options = wheel_options();

@@ -1,0 +1,33 @@
+// Chi-square tests of the innovations of all sensors.
+#pragma once
+
+#include "spartan/localization/internal/updates/motion_decision.h"
+#include "spartan/localization/localization_options.h"
+#include "spartan/localization/localizer.h"
+
+namespace spartan::internal {
+
+/// While a sensor is excluded, this fraction of each squared residual r² is added to the variance of its bias, so that
+/// a sensor whose bias has changed permanently is readmitted: after n ≈ 30 readings, where fraction · n · r² exceeds r²
+/// over the gate.
+inline constexpr double kChangedBiasFraction = 0.003;
+
+class SensorGates {
+ public:
+  explicit SensorGates(const LocalizationOptions& options);
+
+  /// Tests a normalized innovation squared with `rows` degrees of freedom. The monitor counts it, excludes the sensor
+  /// or readmits it; returns whether the measurement may be used.
+  bool accept(SensorMonitor& monitor, double nis, int rows, HealthReason why) const;
+  /// The same with a limit of the caller's.
+  bool accept_within(SensorMonitor& monitor, double nis, double limit, HealthReason why) const;
+
+  const MotionGates& limits() const { return limits_; }
+  double limit(int rows) const { return limits_.by_rows[static_cast<std::size_t>(rows)]; }
+
+ private:
+  MotionGates limits_;
+  int excluded_after_, readmit_after_;
+};
+
+}  // namespace spartan::internal
