@@ -17,7 +17,7 @@ class StatePropagation {
  private:
   void propagate_inertially(FilterMemory& memory, double seconds, const ImuSample& from, const ImuSample& to) const;
   void propagate_at_constant_velocity(FilterMemory& memory, double seconds) const;
-  void propagate_biases(ErrorCovariance& covariance, double seconds) const;
+  void propagate_biases(ErrorCovariance& p, double seconds) const;
 
   double gravity_m_s2_;
   InertialOptions imu_;

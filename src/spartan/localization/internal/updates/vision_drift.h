@@ -13,7 +13,7 @@ class VisionDrift {
   explicit VisionDrift(const VisionOptions& options);
 
   /// Their variances before any motion.
-  void start(ErrorCovariance& covariance) const;
+  void start(ErrorCovariance& p) const;
   /// To the next motion.
   void propagate(StateEstimate& estimate) const;
 
