@@ -19,15 +19,15 @@ void begin_past(StateEstimate& estimate) {
 void correct_past(PastState& past, const PresentUpdate& u) {
   using Columns = Eigen::Matrix<double, error_at::kSize, Eigen::Dynamic, 0, error_at::kSize, 6>;
   using Rows = Eigen::Matrix<double, Eigen::Dynamic, error_at::kSize, 0, 6, error_at::kSize>;
-  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
+  using RowsSquare = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
   const Innovation& i = u.innovation;
   Rows residual_with_error = i.jacobian * u.covariance;  // E[r δᵀ]
-  Square residual_with_noise = i.noise;                  // E[r vᵀ]
+  RowsSquare residual_with_noise = i.noise;              // E[r vᵀ]
   if (i.shared.cols() > 0) {
     residual_with_error += i.shared.transpose();
     residual_with_noise += i.jacobian * i.shared;
   }
-  Square s = residual_with_error * i.jacobian.transpose() + residual_with_noise;
+  RowsSquare s = residual_with_error * i.jacobian.transpose() + residual_with_noise;
   s = (0.5 * (s + s.transpose())).eval();
   Columns past_with_noise = Columns::Zero(error_at::kSize, i.rows());
   if (i.shared.cols() > 0) {

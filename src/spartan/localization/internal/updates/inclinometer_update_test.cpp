@@ -13,11 +13,11 @@ TEST(InclinometerUpdate, FirstReadingGivesTheVertical) {
   const LocalizationOptions options = test_options();
   FilterMemory memory = started_memory(options, {false, false, false, false});
   ASSERT_FALSE(memory.gravity_known);
-  InclinometerUpdate(options).update(memory, {start_stamp(), 0.1, -0.05, 0.003});
+  InclinometerUpdate(options).update(memory, {start_stamp(), 0.7, -0.5, 0.003});
   EXPECT_TRUE(memory.gravity_known);
   const Eigen::Vector3d up = true_up(memory.estimate.state.gravity_tilt_rad);
-  EXPECT_LT((memory.estimate.state.world_from_body.rotation().conjugate() * up - up_of_roll_pitch(0.1, -0.05)).norm(),
-            1e-3);
+  EXPECT_LT((memory.estimate.state.world_from_body.rotation().conjugate() * up - up_of_roll_pitch(0.7, -0.5)).norm(),
+            1e-6);
 }
 
 TEST(InclinometerUpdate, EstimatesItsBias) {

@@ -34,9 +34,9 @@ VisionDrift::VisionDrift(const VisionOptions& options)
       slow_frames_(options.drift_correlation_frames) {}
 
 void VisionDrift::start(ErrorCovariance& p) const {
-  constexpr double kMinVariance = 1e-12;
-  p.diagonal().segment<6>(error_at::kVisionDrift) = slow_sigmas_.cwiseAbs2().cwiseMax(kMinVariance);
-  p.diagonal().segment<6>(error_at::kVisionConstant) = constant_sigmas_.cwiseAbs2().cwiseMax(kMinVariance);
+  constexpr double kLeastDriftVariance = 1e-12;
+  p.diagonal().segment<6>(error_at::kVisionDrift) = slow_sigmas_.cwiseAbs2().cwiseMax(kLeastDriftVariance);
+  p.diagonal().segment<6>(error_at::kVisionConstant) = constant_sigmas_.cwiseAbs2().cwiseMax(kLeastDriftVariance);
 }
 
 void VisionDrift::propagate(StateEstimate& estimate) const {
