@@ -49,24 +49,19 @@ struct Setup {
   const TrueDrive& drive;
   LocalizationOptions options;
   double misstated = 1;  ///< true over stated noise of all sensors but vision and wheels
-  int first_seed = 1, seeds = 50;
+  Seeds seeds;
 };
 
 std::vector<TrialResult> trials_of(const Setup& setup, const Subset& subset, const ThreadPool& workers) {
-  std::vector<TrialResult> results(static_cast<std::size_t>(setup.seeds));
-  workers.parallel_for(0, setup.seeds, 1, [&](int from, int to) {
-    for (int i = from; i < to; ++i) {
-      const auto seed = static_cast<std::uint64_t>(setup.first_seed + i);
-      DrawnDrive d = draw(setup.drive, {}, setup.drive.scenario.compass, seed);
-      for (CompassSample& s : d.compass) s.sigma_rad /= setup.misstated;
-      for (InclinometerSample& s : d.inclinometer) s.sigma_rad /= setup.misstated;
-      std::vector<Arrival> all = arrivals(d, subset);
-      const Stamp start = sim::internal::stamp_at(setup.drive.frames_s.front());
-      std::erase_if(all, [&](const Arrival& a) { return a.at_ns < start.ns; });
-      results[static_cast<std::size_t>(i)] = run_trial(setup.drive, all, setup.options);
-    }
+  return run_trials(setup.seeds, workers, [&](std::uint64_t seed) {
+    DrawnDrive d = draw(setup.drive, {}, setup.drive.scenario.compass, seed);
+    for (CompassSample& s : d.compass) s.sigma_rad /= setup.misstated;
+    for (InclinometerSample& s : d.inclinometer) s.sigma_rad /= setup.misstated;
+    std::vector<Arrival> all = arrivals(d, subset);
+    const Stamp start = sim::internal::stamp_at(setup.drive.frames_s.front());
+    std::erase_if(all, [&](const Arrival& a) { return a.at_ns < start.ns; });
+    return run_trial(setup.drive, all, setup.options);
   });
-  return results;
 }
 
 double largest(const std::vector<TrialResult>& trials, const auto& value) {
@@ -77,7 +72,7 @@ double largest(const std::vector<TrialResult>& trials, const auto& value) {
 
 void print_grade(const std::string& name, const Setup& setup, const ThreadPool& workers) {
   const TrueDrive& drive = setup.drive;
-  const Band three = band(3, setup.seeds);
+  const Band three = band(3, setup.seeds.count);
   fmt::print(
       "\n### {} IMU\n\n| sensors | final error, % | minus vision alone | ATE, mm | minus vision alone | NEES position, "
       "attitude | frames in its band, % | IMU aligned after, s, m | not aligned | IMU not ok, frames | clock, ms | its "
@@ -151,14 +146,16 @@ void print_scenario(const std::string& name, const RecordingArguments& arguments
     drive->scenario.imu = sim::imu_of_grade(*kind);
     drive->scenario.imu.position_m = kPosition_m;
     drive->scenario.imu.delay_ms = arguments.number("--delay-ms");
-    Setup setup{*drive, options_for(*drive), std::stod(arguments.options.at("--misstated")),
-                arguments.number("--first"), arguments.number("--seeds")};
+    Setup setup{*drive,
+                options_for(*drive),
+                std::stod(arguments.options.at("--misstated")),
+                {arguments.number("--first"), arguments.number("--seeds")}};
     scale_noise(drive->scenario, setup.misstated);
     setup.options.imu.position_m = Eigen::Map<const Eigen::Vector3d>(kPosition_m.data());
     if (grade == split(arguments.options.at("--grades")).front()) {
-      const Band three = band(3, setup.seeds);
+      const Band three = band(3, setup.seeds.count);
       fmt::print("\n## {}: {:.0f} m, {} frames, {} seeds, stamps of the IMU {} ms late\n\n", name, drive->length_m,
-                 drive->poses.size(), setup.seeds, arguments.number("--delay-ms"));
+                 drive->poses.size(), setup.seeds.count, arguments.number("--delay-ms"));
       fmt::print(
           "NEES at the end, 95 % band: {:.2f} to {:.2f}; * outside. Aligned, not ok: the largest of all seeds.\n",
           three.low, three.high);

@@ -31,22 +31,12 @@ std::vector<double> each(const std::vector<TrialResult>& trials, const Value& va
 
 using MeasurementSource = std::function<std::vector<Arrival>(const TrueDrive&, std::uint64_t seed, const Subset&)>;
 
-struct Seeds {
-  int first = 1, count = 30;
-};
-
 std::vector<TrialResult> run_trials(const TrueDrive& drive, const Subset& subset, const Seeds& seeds,
                                     const MeasurementSource& arrivals_of, const ThreadPool& workers,
                                     const std::optional<Watch>& watch = {}) {
-  std::vector<TrialResult> results(static_cast<std::size_t>(seeds.count));
-  workers.parallel_for(0, seeds.count, 1, [&](int from, int to) {
-    for (int i = from; i < to; ++i) {
-      const auto seed = static_cast<std::uint64_t>(seeds.first + i);
-      results[static_cast<std::size_t>(i)] =
-          run_trial(drive, arrivals_of(drive, seed, subset), options_for(drive), watch);
-    }
+  return run_trials(seeds, workers, [&](std::uint64_t seed) {
+    return run_trial(drive, arrivals_of(drive, seed, subset), options_for(drive), watch);
   });
-  return results;
 }
 
 std::vector<Arrival> nominal(const TrueDrive& drive, std::uint64_t seed, const Subset& subset) {

@@ -205,4 +205,19 @@ inline TrialResult run_trial(const TrueDrive& drive, const std::vector<Arrival>&
   return result;
 }
 
+struct Seeds {
+  int first = 1, count = 30;
+};
+
+/// trial(seed) for each seed, in their order.
+template <class Trial>
+std::vector<TrialResult> run_trials(const Seeds& seeds, const ThreadPool& workers, const Trial& trial) {
+  std::vector<TrialResult> results(static_cast<std::size_t>(seeds.count));
+  workers.parallel_for(0, seeds.count, 1, [&](int from, int to) {
+    for (int i = from; i < to; ++i)
+      results[static_cast<std::size_t>(i)] = trial(static_cast<std::uint64_t>(seeds.first + i));
+  });
+  return results;
+}
+
 }  // namespace spartan

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "spartan/localization/internal/localization_inputs.h"
+#include "spartan/localization/internal/processing_order.h"
 #include "spartan/localization/internal/replay_filter.h"
 
 namespace spartan {
@@ -22,10 +23,9 @@ constexpr std::uint32_t kStateVersion = 8;
 struct Localizer::State {
   explicit State(const LocalizationOptions& o) : options(o), filter(o) {}
 
-  bool add(Measurement m) {
+  bool add(const Measurement& measurement) {
+    const Measurement m = by_stated_clock(measurement, options.imu);
     std::optional<Refusal> refusal;
-    if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr && options.imu.time_offset_s != 0)
-      imu->stamp.ns -= std::llround(options.imu.time_offset_s * 1e9);
     const auto* motion = std::get_if<RelativeMotion>(&m);
     if (!is_valid(m)) {
       refusal = Refusal::not_finite;

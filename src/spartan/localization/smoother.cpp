@@ -124,10 +124,7 @@ Smoother& Smoother::operator=(Smoother&&) noexcept = default;
 Smoother::~Smoother() = default;
 
 void Smoother::add(const Measurement& measurement) {
-  Measurement m = measurement;
-  if (auto* imu = std::get_if<ImuSample>(&m); imu != nullptr)
-    imu->stamp.ns -= std::llround(state_->options.imu.time_offset_s * 1e9);
-  state_->log.add(m, state_->order);
+  state_->log.add(by_stated_clock(measurement, state_->options.imu), state_->order);
 }
 
 void Smoother::start(const LocalizationStart& start) {

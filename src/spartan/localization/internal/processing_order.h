@@ -13,6 +13,12 @@ namespace spartan::internal {
 /// Samples from so long before the start count for its alignment.
 inline constexpr double kBeforeStart_s = 10;
 
+/// A sample of the IMU gets its stamp by the clock of the cameras, as far as the options state the offset.
+inline Measurement by_stated_clock(Measurement m, const InertialOptions& options) {
+  if (auto* imu = std::get_if<ImuSample>(&m)) imu->stamp.ns -= std::llround(options.time_offset_s * 1e9);
+  return m;
+}
+
 /// By stamps, then by kind; a sample of the IMU comes earlier by InertialOptions::max_time_error_s, because it may be
 /// needed that long before its stamp.
 class ProcessingOrder {

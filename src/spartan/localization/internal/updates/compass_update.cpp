@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "spartan/localization/internal/measurement_models.h"
+#include "spartan/localization/internal/updates/biased_sensor.h"
 #include "spartan/localization/internal/updates/filter_correction.h"
 
 namespace spartan::internal {
@@ -24,16 +25,8 @@ void CompassUpdate::update(FilterMemory& memory, const CompassSample& sample) co
     initialize_offset(memory, sample, sigma);
     return;
   }
-  const Innovation innovation = compass_innovation(memory.estimate.state, sample.heading_rad, sigma);
-  const double nis = normalized_innovation_squared(memory.estimate.covariance, innovation);
-  SensorMonitor& monitor = memory.monitor(LocalizationSensor::compass);
-  if (gates_.accept(monitor, nis, 1, HealthReason::disagrees)) {
-    if (memory.inertial_usable()) noise.add(memory.estimate.covariance, innovation, stated * stated);
-    correct_world(memory, innovation);
-  } else if (monitor.state == SensorState::excluded) {
-    memory.estimate.covariance(error_at::kCompassOffset, error_at::kCompassOffset) +=
-        kChangedBiasFraction * innovation.residual.squaredNorm();
-  }
+  correct_by_reading(memory, compass_innovation(memory.estimate.state, sample.heading_rad, sigma),
+                     {LocalizationSensor::compass, error_at::kCompassOffset, stated * stated, noise}, gates_);
 }
 
 void CompassUpdate::initialize_offset(FilterMemory& memory, const CompassSample& sample, double sigma_rad) const {

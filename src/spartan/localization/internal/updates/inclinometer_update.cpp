@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "spartan/localization/internal/measurement_models.h"
-#include "spartan/localization/internal/updates/filter_correction.h"
+#include "spartan/localization/internal/updates/biased_sensor.h"
 
 namespace spartan::internal {
 namespace {
@@ -35,10 +35,10 @@ void InclinometerUpdate::update(FilterMemory& memory, const InclinometerSample& 
   memory.inclinometer.known = true;
   memory.inclinometer.last = sample;
   NoiseRatio& noise = memory.inclinometer.noise;
-  const bool inertial = memory.inertial_usable();
   const double stated = stated_sigma(options_, sample);
   // Without an IMU, the visual motions have measured the noise of the readings and the rocking between them.
-  const double factor = inertial ? noise.factor() : std::max(1.0, memory.inclinometer.of_motions.factor());
+  const double factor =
+      memory.inertial_usable() ? noise.factor() : std::max(1.0, memory.inclinometer.of_motions.factor());
   const double sigma = stated * std::sqrt(factor);
   NavigationState& s = memory.estimate.state;
   if (!memory.gravity_known) {
@@ -49,15 +49,8 @@ void InclinometerUpdate::update(FilterMemory& memory, const InclinometerSample& 
   }
   const Innovation innovation = inclinometer_innovation(s, sample.roll_rad, sample.pitch_rad, sigma);
   inflate_attitude(memory, innovation);
-  const double nis = normalized_innovation_squared(memory.estimate.covariance, innovation);
-  SensorMonitor& monitor = memory.monitor(LocalizationSensor::inclinometer);
-  if (gates_.accept(monitor, nis, 2, HealthReason::disagrees)) {
-    if (inertial) noise.add(memory.estimate.covariance, innovation, stated * stated);
-    correct_world(memory, innovation);
-  } else if (monitor.state == SensorState::excluded) {
-    memory.estimate.covariance.diagonal().segment<2>(error_at::kInclinometerBias) +=
-        kChangedBiasFraction * innovation.residual.cwiseAbs2();
-  }
+  correct_by_reading(memory, innovation,
+                     {LocalizationSensor::inclinometer, error_at::kInclinometerBias, stated * stated, noise}, gates_);
 }
 
 }  // namespace spartan::internal

@@ -43,7 +43,7 @@ MotionWitnesses::MotionWitnesses(const LocalizationOptions& options)
     : white_noise_factor_(options.vision.white_noise_factor),
       wheels_(options.wheels),
       inclinometer_(options.inclinometer),
-      wheel_centre_(LeverArm(options.imu.position_m).from_imu(options.wheels.turning_centre_m)) {}
+      wheel_centre_(turning_centre(options)) {}
 
 MotionEvidence MotionWitnesses::evidence_of(const FilterMemory& memory, const VisualMotion& visual,
                                             const Innovation& innovation) const {

@@ -7,11 +7,6 @@
 
 namespace spartan::internal {
 
-/// While a sensor is excluded, this fraction of each squared residual r² is added to the variance of its bias, so that
-/// a sensor whose bias has changed permanently is readmitted: after n ≈ 30 readings, where fraction · n · r² exceeds r²
-/// over the gate.
-inline constexpr double kChangedBiasFraction = 0.003;
-
 class SensorGates {
  public:
   explicit SensorGates(const LocalizationOptions& options);

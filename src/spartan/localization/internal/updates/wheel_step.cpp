@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "spartan/localization/internal/lever_arm.h"
+
 namespace spartan::internal {
 
 std::optional<WheelSample> wheels_at(const WheelMemory& w, Stamp stamp) {
@@ -11,6 +13,10 @@ std::optional<WheelSample> wheels_at(const WheelMemory& w, Stamp stamp) {
   const double part = apart > 0 ? beyond / apart : 0;
   return WheelSample{stamp, w.last.left_m + part * (w.last.left_m - w.previous.left_m),
                      w.last.right_m + part * (w.last.right_m - w.previous.right_m)};
+}
+
+Eigen::Vector3d turning_centre(const LocalizationOptions& options) {
+  return LeverArm(options.imu.position_m).from_imu(options.wheels.turning_centre_m);
 }
 
 WheelStep step_between(const WheelSample& from, const WheelSample& to, const WheelOdometryOptions& o) {

@@ -16,6 +16,9 @@ inline constexpr double kFreshWheels_s = 0.5;
 /// tell.
 std::optional<WheelSample> wheels_at(const WheelMemory& wheels, Stamp stamp);
 
+/// Turning centre of the wheels, relative to the IMU.
+Eigen::Vector3d turning_centre(const LocalizationOptions& options);
+
 /// What the wheels measure between two samples, with its standard deviations.
 WheelStep step_between(const WheelSample& from, const WheelSample& to, const WheelOdometryOptions& options);
 

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "spartan/localization/internal/lever_arm.h"
 #include "spartan/localization/internal/updates/filter_correction.h"
 #include "spartan/localization/internal/updates/wheel_step.h"
 
@@ -21,7 +20,7 @@ WheelUpdate::WheelUpdate(const LocalizationOptions& options)
     : options_(options.wheels),
       stationary_m_(options.zero_velocity.wheels_stationary_m),
       imu_timeout_s_(options.imu.timeout_s),
-      centre_(LeverArm(options.imu.position_m).from_imu(options.wheels.turning_centre_m)),
+      centre_(turning_centre(options)),
       gates_(options) {}
 
 void WheelUpdate::update(FilterMemory& memory, const WheelSample& sample) const {
