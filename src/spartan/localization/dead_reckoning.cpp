@@ -2,21 +2,17 @@
 #include <array>
 #include <cmath>
 
+#include "spartan/localization/internal/updates/vision_drift.h"
 #include "spartan/localization/localizer.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 constexpr std::uint32_t kVersion = 3;
 constexpr int kDrift = 6, kConstant = 12, kCalibration = 18;  // where z₁, z₂ and η begin
-/// As the filter has it: what stays for a drive falls to 1/e after so many frames.
-constexpr double kConstantSteps = 5000;
-
-Vector6d six_of(const std::vector<double>& values) {
-  Vector6d six = Vector6d::Zero();
-  std::copy_n(values.begin(), std::min<std::size_t>(6, values.size()), six.data());
-  return six;
-}
 
 }  // namespace
 
@@ -28,19 +24,12 @@ Result<DeadReckoning> DeadReckoning::create(const VisionOptions& options) {
 DeadReckoning::DeadReckoning(const VisionOptions& options)
     : white_noise_factor_(options.white_noise_factor),
       drift_correlation_frames_(options.drift_correlation_frames),
-      drift_sigma_ratios_(six_of(options.drift_sigma_ratios)),
-      constant_sigma_ratios_(six_of(options.constant_sigma_ratios)) {
+      drift_sigma_ratios_(six_sigma_ratios(options.drift_sigma_ratios)),
+      constant_sigma_ratios_(six_sigma_ratios(options.constant_sigma_ratios)) {
   covariance_.diagonal().segment<6>(kDrift) = drift_sigma_ratios_.cwiseAbs2();
   covariance_.diagonal().segment<6>(kConstant) = constant_sigma_ratios_.cwiseAbs2();
   covariance_.diagonal().tail<kSize - kCalibration>().setOnes();
   at_reference_ = covariance_;
-}
-
-void DeadReckoning::age(int index, const Vector6d& sigmas, double steps) {
-  const double stays = std::exp(-1 / steps);
-  covariance_.middleRows<6>(index) *= stays;
-  covariance_.middleCols<6>(index) *= stays;
-  covariance_.diagonal().segment<6>(index) += (1 - stays * stays) * sigmas.cwiseAbs2();
 }
 
 void DeadReckoning::add(const RelativeMotion& motion) {
@@ -51,8 +40,8 @@ void DeadReckoning::add(const RelativeMotion& motion) {
   const Pose& moved = motion.previous_from_current;
   const bool drifts = motion.measured && !motion.is_stationary();
   if (drifts) {
-    age(kDrift, drift_sigma_ratios_, drift_correlation_frames_);
-    age(kConstant, constant_sigma_ratios_, kConstantSteps);
+    propagate_drift(covariance_, kDrift, drift_sigma_ratios_, drift_that_stays(drift_correlation_frames_));
+    propagate_drift(covariance_, kConstant, constant_sigma_ratios_, drift_that_stays(kConstantDriftFrames));
   }
   const Matrix6d noise = motion.own_covariance();
   Covariance by = Covariance::Identity();

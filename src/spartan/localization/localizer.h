@@ -359,7 +359,6 @@ class DeadReckoning {
 
   static constexpr int kSize = 26;  // ξ, z₁, z₂, η
   using Covariance = Eigen::Matrix<double, kSize, kSize>;
-  void age(int index, const Vector6d& sigmas, double steps);
 
   double white_noise_factor_, drift_correlation_frames_;
   Vector6d drift_sigma_ratios_ = Vector6d::Zero(), constant_sigma_ratios_ = Vector6d::Zero();
