@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"

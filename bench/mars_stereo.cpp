@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/eval/disparity_metrics.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_computer.h"
@@ -69,8 +69,8 @@ void add_scores(ImageView<const float> estimate, ImageView<const float> truth, I
   }
 }
 
-void compare_pair(FrameSource& source, Imager& imager, const StereoPair& pair, Stamp stamp,
-                  const std::string& recording, Scores& scores) {
+void compare_pair(Recording& source, Imager& imager, const StereoPair& pair, Stamp stamp, const std::string& recording,
+                  Scores& scores) {
   const auto frame = source.frame_at(pair.name, stamp);
   const std::string name = fmt::format("/{}/{}.png", pair.name, stamp.ns);
   const auto truth = read_disparity(recording + "/truth/disparity" + name);

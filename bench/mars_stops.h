@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/imaging/imager.h"
@@ -22,7 +22,7 @@ namespace spartan {
 // A recording with its ground truth.
 struct Drive {
   std::string folder;
-  std::unique_ptr<FrameSource> source;
+  std::unique_ptr<Recording> source;
   Rig rig;
   Trajectory poses;
   LoadedMap elevation, obstacles;

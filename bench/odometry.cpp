@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "odometry_rival.h"
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/threads.h"
 #include "spartan/image_io/opencv_bridge.h"
 #include "spartan/imaging/imager.h"

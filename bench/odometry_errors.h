@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/numerics/random.h"
 #include "spartan/odometry/odometer.h"

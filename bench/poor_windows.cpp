@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/imaging/imager.h"
 #include "standard_recordings.h"
 #include "stereo_pairs.h"

@@ -61,7 +61,7 @@ inline std::optional<Pose> smoothed(const Trajectory& truth, Stamp at, double ha
               reference.translation() + at_zero.head<3>().transpose());
 }
 
-inline std::vector<ImuSample> all_imu(FrameSource& source) {
+inline std::vector<ImuSample> all_imu(Recording& source) {
   auto samples = source.imu_samples({}, 1e6);
   if (!samples) throw std::runtime_error(samples.error().message());
   return *samples;

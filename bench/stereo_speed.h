@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/reconstruction/disparity_computer.h"
 #include "stereo_pairs.h"

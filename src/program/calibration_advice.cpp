@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "program/inspection_images.h"
-#include "spartan/calibration/pair_inspection.h"
+#include "spartan/calibration/pair_check.h"
 #include "spartan/system/run_options.h"
 
 namespace spartan::program {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/threads.h"
 
 namespace spartan::program {

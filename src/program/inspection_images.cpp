@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/imaging/imager.h"
@@ -139,7 +139,7 @@ Result<std::vector<ImagePair>> load_images_of(const Camera& left_camera, const C
   return pairs;
 }
 
-Result<std::vector<ImagePair>> load_frames(FrameSource& source, const std::string& pair, int most,
+Result<std::vector<ImagePair>> load_frames(Recording& source, const std::string& pair, int most,
                                            const ThreadPool& workers) {
   ImagingOptions options;
   options.rectify = false;

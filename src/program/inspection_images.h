@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
@@ -29,7 +29,7 @@ Result<std::vector<ImagePair>> load_images_of(const Camera& left_camera, const C
                                               const ThreadPool& workers);
 
 /// Frames of one pair of a recording, spread evenly; unreadable ones are skipped. Code `input` if none can be read.
-Result<std::vector<ImagePair>> load_frames(FrameSource& source, const std::string& pair, int most,
+Result<std::vector<ImagePair>> load_frames(Recording& source, const std::string& pair, int most,
                                            const ThreadPool& workers);
 
 }  // namespace spartan::program

@@ -14,7 +14,7 @@
 #include "program/recording_arguments.h"
 #include "program/run_arguments.h"
 #include "spartan/calibration_io/calibration_files.h"
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/files.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/stage_clock.h"
@@ -101,7 +101,7 @@ Result<Stop> load_pair(const BuildArguments& a) {
 }
 
 // The frames of the requested stop, or the requested frame of the odometry pair.
-Result<std::vector<FrameKey>> frames_to_map(const FrameSource& source, const BuildArguments& a) {
+Result<std::vector<FrameKey>> frames_to_map(const Recording& source, const BuildArguments& a) {
   if (a.frame) {
     const StereoPair* const pair = odometry_pair_of(source.info().rig, {});
     if (pair == nullptr) return failure(ErrorCode::configuration, "the rig has no pair for the odometry", a.recording);

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "program/context.h"
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 
 namespace spartan::program {
 

@@ -15,7 +15,7 @@
 #include "program/recording_arguments.h"
 #include "program/rig_convert.h"
 #include "program/rig_inspect_apply.h"
-#include "spartan/calibration/pair_inspection.h"
+#include "spartan/calibration/pair_check.h"
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/core/pose.h"
 #include "spartan/image_io/image_io.h"

@@ -28,6 +28,7 @@ struct RunArguments {
   std::vector<std::string> set;
   bool resume = false, odometry_only = false;
   int max_frames = 0;
+  LiveOptions live;
 };
 
 // Compares the run's trajectory with the truth; the summary gets the figures under "truth".
@@ -76,6 +77,13 @@ void advise(const RunRequest& request, const RunOutcome& outcome, const Context&
                                                  : advice));
 }
 
+Result<RunOutcome> run_input(const RunArguments& arguments, const RunRequest& request, const RunHooks& hooks) {
+  if (!is_live_address(arguments.input)) return run(request, hooks);
+  const auto stream = open_live_stream(arguments.input, request.open, arguments.live);
+  if (!stream) return failure(stream);
+  return run_live(**stream, request, hooks);
+}
+
 Result<ExitCode> run_command(const Context& context, const RunArguments& arguments) {
   RunRequest request;
   auto chosen = choose_options(context, arguments.config, arguments.set);
@@ -99,7 +107,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   if (!arguments.truth.empty()) {
     if (const auto truth = load_truth(arguments.truth); !truth) return failure(truth);
   }
-  auto outcome = run(request, run_hooks(context, progress));
+  auto outcome = run_input(arguments, request, run_hooks(context, progress));
   if (!outcome) return failure(outcome);
   std::string text = run_summary_text(outcome->summary_json, arguments.output);
   if (!arguments.truth.empty() && !outcome->interrupted) {
@@ -107,14 +115,15 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
     if (!table) return failure(table);
     text += "\n" + *table;
   }
-  if (!outcome->interrupted) {
+  const bool live = is_live_address(arguments.input);
+  if (!outcome->interrupted && !live) {
     if (Status s = write_report(request, arguments.truth, context); !s)
       context.log.warning("no report was written: " + s.error().message());
   }
-  if (outcome->lost && !outcome->interrupted) advise(request, *outcome, context);
+  if (outcome->lost && !outcome->interrupted && !live) advise(request, *outcome, context);
   const Status printed = print(context.json ? outcome->summary_json : text);
   if (!printed) return failure(printed);
-  if (outcome->interrupted) {
+  if (outcome->interrupted && !live) {
     return failure(ErrorCode::interrupted, "interrupted by the user", arguments.output, "continue with --resume");
   }
   return outcome->lost ? kLost : kDone;
@@ -131,7 +140,8 @@ void add_run(CLI::App& app, Context& context) {
       ->add_option(
           "input", a->input,
           "Folder of the recording, whose layout (Spartan, KITTI odometry, KITTI raw, EuRoC/ASL, image folders) is "
-          "detected and printed, or a video with the images of both cameras side by side.")
+          "detected and printed, or a video with the images of both cameras side by side; or the address of a live "
+          "stream: replay:FOLDER plays a recording at the pace of its stamps.")
       ->required();
   command
       ->add_option("-o,--output", a->output,
@@ -163,6 +173,13 @@ void add_run(CLI::App& app, Context& context) {
   command->add_flag("--odometry-only", a->odometry_only,
                     "Run the visual odometry alone: no localization, maps, SLAM, disparity images or "
                     "point clouds.");
+  command
+      ->add_option("--speed", a->live.speed,
+                   "Pace of a replay, relative to that of its stamps (default 1); raising it leaves less time for each "
+                   "frame.")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--passes", a->live.passes, "How often a replay plays its recording (default 1).")
+      ->check(CLI::PositiveNumber);
   add_force_flag(*command, context)->excludes(resume);
   add_threads_option(*command, context);
   add_memory_option(*command, context);

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/image_io/image_io.h"

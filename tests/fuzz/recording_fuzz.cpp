@@ -4,7 +4,7 @@
 #include <string>
 
 #include "spartan/calibration_io/calibration_files.h"
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/testing/temporary_folder.h"
 

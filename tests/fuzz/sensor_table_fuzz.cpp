@@ -9,7 +9,7 @@ using namespace spartan::internal;
 
 namespace {
 
-void read_all(const SampleStreamFactory& open) {
+void read_all(const SensorStreamFactory& open) {
   const auto stream = open();
   if (!stream) return;
   for (;;) {

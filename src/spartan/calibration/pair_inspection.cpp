@@ -1,5 +1,3 @@
-#include "spartan/calibration/pair_inspection.h"
-
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -7,6 +5,7 @@
 
 #include "spartan/calibration/internal/pair_refinement.h"
 #include "spartan/calibration/internal/row_errors.h"
+#include "spartan/calibration/pair_check.h"
 #include "spartan/odometry/view_matching.h"
 
 namespace spartan {

@@ -1,5 +1,3 @@
-#include "spartan/calibration/pair_inspection.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "spartan/calibration/pair_check.h"
 #include "spartan/core/pose.h"
 #include "spartan/testing/synthetic_world.h"
 

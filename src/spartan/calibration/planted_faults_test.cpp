@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "spartan/calibration/internal/model_modification.h"
-#include "spartan/calibration/pair_inspection.h"
+#include "spartan/calibration/pair_check.h"
 #include "spartan/core/files.h"
 #include "spartan/core/pose.h"
 #include "spartan/image_io/image_io.h"

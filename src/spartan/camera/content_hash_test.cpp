@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/testing/tiny_recordings.h"
 
 namespace spartan {
@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
-std::unique_ptr<FrameSource> open_tiny(const TemporaryFolder& folder) {
+std::unique_ptr<Recording> open_tiny(const TemporaryFolder& folder) {
   auto source = open_recording(folder.path());
   EXPECT_TRUE(source) << source.error().message();
   return std::move(*source);
@@ -156,9 +156,9 @@ TEST(UnreadableRows, AreLeftOutAndCounted) {
   const auto samples = testing::collect_samples(*source);
   EXPECT_EQ(samples.error, "");
   EXPECT_EQ(samples.all.size(), 4U) << "two rows of the wheels and two frames";
-  const UnreadableRows rows = source->unreadable_sensor_rows();
-  EXPECT_EQ(rows.count, 3);
-  EXPECT_THAT(rows.first, HasSubstr("wheels.csv:3: 'nan' is not a finite number"));
+  const DiscardedSamples rows = source->discarded();
+  EXPECT_EQ(rows.unreadable, 3);
+  EXPECT_THAT(rows.first_unreadable, HasSubstr("wheels.csv:3: 'nan' is not a finite number"));
 }
 
 TEST(FilesOutsideOfTheRecording, AreRejected) {

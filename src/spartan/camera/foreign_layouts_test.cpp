@@ -7,7 +7,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "spartan/calibration_io/calibration_files.h"
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/testing/real_data.h"
@@ -35,7 +35,7 @@ class ForeignLayouts : public ::testing::Test {
   std::string text_of(const std::string& name) { return read_file(folder_.path() + "/" + name).value(); }
   void remove(const std::string& name) { ASSERT_TRUE(std::filesystem::remove_all(folder_.path() + "/" + name) > 0); }
 
-  std::unique_ptr<FrameSource> open(const OpenOptions& options = {}) {
+  std::unique_ptr<Recording> open(const OpenOptions& options = {}) {
     auto source = open_recording(folder_.path(), options);
     EXPECT_TRUE(source) << source.error().message();
     return source ? std::move(*source) : nullptr;
@@ -47,7 +47,7 @@ class ForeignLayouts : public ::testing::Test {
     return source.error().message();
   }
   // "f0 f1 right_missing …": frames by id, missing frames by fault, IMU samples as i.
-  std::vector<std::string> collect_samples(FrameSource& source) {
+  std::vector<std::string> collect_samples(Recording& source) {
     std::vector<std::string> seen;
     while (true) {
       const auto sample = source.next();

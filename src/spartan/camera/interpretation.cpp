@@ -1,4 +1,4 @@
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 
 namespace spartan {
 

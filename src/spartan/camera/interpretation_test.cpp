@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 
 namespace spartan {
 namespace {

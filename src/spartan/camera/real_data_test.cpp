@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 
 namespace spartan {
 namespace {
@@ -14,7 +14,7 @@ struct Counts {
   int frames = 0, missing = 0, imu = 0;
 };
 
-Counts count_samples(FrameSource& source) {
+Counts count_samples(Recording& source) {
   Counts counts;
   for (;;) {
     auto sample = source.next();

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <map>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/camera/recording_writer.h"
 #include "spartan/testing/tiny_recordings.h"
 

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <limits>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/numerics/random.h"
 #include "spartan/testing/tiny_recordings.h"

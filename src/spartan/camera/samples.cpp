@@ -18,6 +18,8 @@ std::string_view name_of(FrameFault fault) {
       return "stamps_apart";
     case FrameFault::frozen:
       return "frozen";
+    case FrameFault::dropped:
+      return "dropped";
   }
   return "unreadable";
 }

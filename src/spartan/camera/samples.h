@@ -84,6 +84,12 @@ struct StereoFrame {
   double exposure_us = 0, gain = 0;  ///< 0: unknown
 };
 
+/// Identifies one stereo frame of a stream.
+struct FrameKey {
+  std::string pair;
+  Stamp left_stamp;
+};
+
 /// Angular rate and specific force in the body frame.
 struct ImuSample {
   Stamp stamp;
@@ -118,6 +124,7 @@ enum class FrameFault {
   stamp_reversed,  ///< the stamp is not after the one before
   stamps_apart,    ///< left and right stamp differ too much
   frozen,          ///< an image equals the previous one of its camera, bit for bit
+  dropped,         ///< too many images of a live stream waited to be processed
 };
 
 /// The key under `skipped` in summary.json, e.g. "left_missing".

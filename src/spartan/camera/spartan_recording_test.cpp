@@ -1,4 +1,4 @@
-// Spartan recordings: FrameSource reads what RecordingWriter writes.
+// Spartan recordings: Recording reads what RecordingWriter writes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "spartan/calibration_io/calibration_files.h"
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
@@ -80,7 +80,7 @@ StereoFrame make_frame(std::int64_t id, const std::string& pair, std::int64_t st
   return frame;
 }
 
-std::vector<Sample> all_samples(FrameSource& source) {
+std::vector<Sample> all_samples(Recording& source) {
   std::vector<Sample> samples;
   while (true) {
     auto sample = source.next();
@@ -254,8 +254,8 @@ TEST_F(SpartanRecordingFaults, ATruncatedRowIsLeftOut) {
   const auto source = open_recording(path_);
   ASSERT_TRUE(source);
   EXPECT_EQ(all_samples(**source).size(), 9U);
-  EXPECT_EQ((*source)->unreadable_sensor_rows().count, 1);
-  EXPECT_THAT((*source)->unreadable_sensor_rows().first, HasSubstr("imu.csv:6: the file is truncated"));
+  EXPECT_EQ((*source)->discarded().unreadable, 1);
+  EXPECT_THAT((*source)->discarded().first_unreadable, HasSubstr("imu.csv:6: the file is truncated"));
 }
 
 TEST_F(SpartanRecordingFaults, SkipsMissingAndDamagedImages) {

@@ -79,6 +79,11 @@ class FrameImage {
   int width() const { return size_.width; }
   int height() const { return size_.height; }
   bool empty() const { return size_.empty(); }
+  /// Memory of the pixels.
+  std::size_t bytes() const {
+    return static_cast<std::size_t>(size_.width) * static_cast<std::size_t>(size_.height) *
+           static_cast<std::size_t>(format_.bytes_per_sample() * (format_.layout == PixelLayout::rgb ? 3 : 1));
+  }
 
   /// The pixels as uint8_t, uint16_t, Rgb8 or Rgb16; throws std::invalid_argument if they have another type.
   template <class Pixel>

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/localization/localizer.h"
 #include "spartan/numerics/random.h"
 

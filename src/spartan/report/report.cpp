@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/files.h"
 #include "spartan/eval/trajectory_metrics.h"
 #include "spartan/figures/html.h"

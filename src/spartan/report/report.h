@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "spartan/calibration/pair_check.h"
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"

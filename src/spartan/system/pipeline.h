@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/camera/samples.h"
 #include "spartan/core/archive.h"
 #include "spartan/core/pose.h"

@@ -16,6 +16,7 @@
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/system/internal/pipeline_state.h"
+#include "spartan/system/internal/queued_stream.h"
 #include "spartan/system/internal/run_loop.h"
 #include "spartan/system/internal/run_setup.h"
 #include "spartan/system/internal/smoothed_trajectory.h"
@@ -30,6 +31,18 @@ namespace spartan {
 using namespace internal;
 
 namespace {
+
+// Images of a live stream that wait to be processed, at most: some 100 frames of 1120 x 1120 px.
+constexpr std::size_t kQueueBytes = std::size_t{256} << 20U;
+
+// Where the samples come from.
+struct RunSource {
+  SampleStream& stream;
+  Recording* recording;  // the stream, if it is one; null: live
+  QueuedStream* queue;   // through which a live stream is read
+
+  SampleStream& samples() const { return queue ? *queue : stream; }
+};
 
 void report_sequence(const RecordingInfo& info, const Log& log) {
   const SequenceReport& s = info.sequence;
@@ -119,29 +132,32 @@ Result<RunOutcome> write_results(RunLoop& run_loop, const RunOptions& options, c
   return outcome;
 }
 
-void report_sensor_rows(const FrameSource& source, const Log& log) {
-  if (const std::int64_t rows = source.sensor_samples_discarded(); rows > 0)
-    log.warning(fmt::format("{} sensor samples discarded: their time stamps are not in increasing order", rows));
-  const UnreadableRows unreadable = source.unreadable_sensor_rows();
-  if (unreadable.count > 0) {
+void report_sensor_rows(const SampleStream& stream, const Log& log) {
+  const DiscardedSamples discarded = stream.discarded();
+  if (discarded.reversed > 0) {
+    log.warning(
+        fmt::format("{} sensor samples discarded: their time stamps are not in increasing order", discarded.reversed));
+  }
+  if (discarded.unreadable > 0) {
     log.warning(fmt::format("{} rows of sensor tables discarded: they cannot be parsed; the first: {}",
-                            unreadable.count, unreadable.first));
+                            discarded.unreadable, discarded.first_unreadable));
   }
 }
 
-RunFacts facts_of(const RunRequest& request, const FrameSource& source, const RunOptions& options,
+RunFacts facts_of(const RunRequest& request, const RunSource& source, const RunOptions& options,
                   const RunLoop& run_loop) {
   RunFacts facts;
   facts.version = request.version;
-  facts.input = source.info().path;
-  facts.format = name_of(source.info().format);
+  facts.input = source.stream.info().path;
+  facts.format = source.recording ? name_of(source.recording->info().format) : "live";
+  if (source.queue) facts.live = LiveFacts{run_loop.latencies(), source.queue->dropped(), source.queue->peak_bytes()};
   facts.gravity_measured = run_loop.gravity_measured();
   facts.heading_east = run_loop.heading_east();
   facts.slip_alarm = options.localization.wheels.slip_alarm;
   facts.threads = request.threads;
   facts.absent = disabled_stages(options);
-  facts.sensor_rows_reversed = source.sensor_samples_discarded();
-  facts.sensor_rows_unreadable = source.unreadable_sensor_rows().count;
+  facts.sensor_rows_reversed = source.stream.discarded().reversed;
+  facts.sensor_rows_unreadable = source.stream.discarded().unreadable;
   facts.resumed_from_frame = run_loop.resumed_from_frame();
   const ElapsedTime elapsed = run_loop.elapsed();
   facts.wall_seconds = elapsed.wall_s;
@@ -149,15 +165,33 @@ RunFacts facts_of(const RunRequest& request, const FrameSource& source, const Ru
   return facts;
 }
 
-Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& given_hooks) {
-  const auto start = std::chrono::steady_clock::now();
-  const double start_cpu_s = cpu_seconds();
-  auto source = open_recording(request.input, request.open);
-  if (!source) return failure(source);
-  const RecordingInfo& info = (*source)->info();
+void report_dropped(const QueuedStream& queue, const Log& log) {
+  const DroppedFrames dropped = queue.dropped();
+  if (dropped.odometry + dropped.views + dropped.sensor_samples == 0) return;
+  log.warning(
+      fmt::format("{} frames of the odometry, {} views of other pairs and {} sensor samples were dropped: they "
+                  "arrived faster than they were processed",
+                  dropped.odometry, dropped.views, dropped.sensor_samples));
+}
 
+// A live stream is never the same twice.
+Result<std::string> fingerprint_of(const RunSource& source) {
+  if (!source.recording) return source.stream.info().path;
+  const auto listing = source.recording->listing_hash();
+  if (!listing) return failure(listing);
+  return fmt::format("{:016x}", *listing);
+}
+
+struct RunStart {
+  std::chrono::steady_clock::time_point time = std::chrono::steady_clock::now();
+  double cpu_s = cpu_seconds();
+};
+
+Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, const RunRequest& request,
+                              const RunHooks& given_hooks) {
+  const StreamInfo& info = source.stream.info();
   const ThreadPool workers(request.threads);
-  auto setup = set_up_run(**source, request, workers);
+  auto setup = set_up_run(source.stream, request, workers);
   if (!setup) return failure(setup);
   const Rig& rig = setup->rig;
   const RunOptions& options = setup->options;
@@ -168,28 +202,30 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
   if (!prepared) return failure(prepared);
   RunHooks hooks = given_hooks;
   hooks.log = given_hooks.log.with_file(folder.log());
-  report_sequence(info, hooks.log);
+  if (source.recording) report_sequence(source.recording->info(), hooks.log);
   for (const std::string& sentence : setup->sentences) hooks.log.info(sentence);
   if (options.odometry_only) hooks.log.info("odometry only: no localization, no maps, no SLAM, no terrain");
-  const auto listing = (*source)->listing_hash();
-  if (!listing) return failure(listing);
-  const RunIdentity identity{fmt::format("{:016x}", *listing), dump_options(options), to_rig_yaml(rig)};
+  auto fingerprint = fingerprint_of(source);
+  if (!fingerprint) return failure(fingerprint);
+  const RunIdentity identity{std::move(*fingerprint), dump_options(options), to_rig_yaml(rig)};
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
   if (Status s = write_file_atomically(folder.rig(), identity.rig); !s) return failure(s);
 
-  RunLoop run_loop(request, hooks, **source, std::move(setup->pipeline), std::move(*store), folder, start, start_cpu_s);
+  RunLoop run_loop(request, hooks, source.samples(), source.recording, std::move(setup->pipeline), std::move(*store),
+                   folder, start.time, start.cpu_s);
   if (Status s = run_loop.begin(); !s) return failure(s);
   const Status processed = run_loop.process_samples();
   if (run_loop.usable_frames() > 0) replaced->discard();
+  if (source.queue) source.queue->stop();
   if (!processed) return failure(processed);
-  report_sensor_rows(**source, hooks.log);
+  report_sensor_rows(source.stream, hooks.log);
+  if (source.queue) report_dropped(*source.queue, hooks.log);
   if (run_loop.usable_frames() == 0 && !run_loop.stopped()) {
     // An empty run folder would block the next attempt.
     if (prepared->state == FolderState::created) remove_run_folder(folder);
-    return failure(ErrorCode::input, "the recording has no usable frame; first error: " + run_loop.first_error(),
-                   info.path);
+    return failure(ErrorCode::input, "there is no usable frame; first error: " + run_loop.first_error(), info.path);
   }
 
   if (run_loop.global_map().stops().empty()) report_missing_maps(options, run_loop.complete(), hooks.log);
@@ -203,7 +239,7 @@ Result<RunOutcome> run_recording(const RunRequest& request, const RunHooks& give
     if (Status s = write_smoothed_trajectory(run_loop.store(), with_gravity(resolved), hooks.log); !s)
       return failure(s);
   }
-  RunFacts facts = facts_of(request, **source, options, run_loop);
+  RunFacts facts = facts_of(request, source, options, run_loop);
   facts.level_by_ground = setup->ground_up.has_value();
   auto outcome = write_results(run_loop, resolved, workers, folder, std::move(facts), hooks.log);
   if (outcome) outcome->lock = std::move(prepared->lock);
@@ -222,8 +258,27 @@ Result<RunOutcome> with_store(Result<RunOutcome> outcome, const std::string& sto
 }  // namespace
 
 Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
+  const RunStart start;
   try {
-    return with_store(run_recording(request, hooks), RunFolder{request.output}.store());
+    const auto recording = open_recording(request.input, request.open);
+    if (!recording) return failure(recording);
+    return with_store(run_source({**recording, recording->get(), nullptr}, start, request, hooks),
+                      RunFolder{request.output}.store());
+  } catch (const std::bad_alloc& exception) {
+    return tl::unexpected(out_of_memory(exception));
+  }
+}
+
+Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, const RunHooks& hooks) {
+  const RunStart start;
+  if (request.resume) {
+    return failure(ErrorCode::usage, "a live run cannot be resumed", stream.info().path,
+                   "run into a new folder, or resume with the recording");
+  }
+  const StereoPair* const odometry = odometry_pair_of(stream.info().rig, request.options);
+  try {
+    QueuedStream queue(stream, odometry ? odometry->name : "", kQueueBytes);
+    return with_store(run_source({stream, nullptr, &queue}, start, request, hooks), RunFolder{request.output}.store());
   } catch (const std::bad_alloc& exception) {
     return tl::unexpected(out_of_memory(exception));
   }

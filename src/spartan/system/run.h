@@ -1,11 +1,11 @@
-// Runs the pipeline over a recording and writes a run folder (`spartan run`).
+// Runs the pipeline over a recording or a live stream and writes a run folder (`spartan run`).
 #pragma once
 
 #include <cstdint>
 #include <functional>
 #include <string>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/files.h"
 #include "spartan/core/log.h"
 #include "spartan/core/result.h"
@@ -15,7 +15,7 @@ namespace spartan {
 
 /// What to run, and with which options.
 struct RunRequest {
-  std::string input;   ///< folder of the recording
+  std::string input;   ///< folder of the recording; not used by run_live()
   OpenOptions open;    ///< how to read it
   std::string output;  ///< run folder
   RunOptions options;
@@ -30,7 +30,7 @@ struct RunRequest {
 
 struct RunProgress {
   int done = 0;           ///< frames of the odometry pair, missing ones included
-  int total = 0;          ///< those that the recording lists, at most RunRequest::max_frames
+  int total = 0;          ///< those that the recording lists, at most RunRequest::max_frames; 0: unknown
   double distance_m = 0;  ///< path length of the odometry
   std::string status;     ///< of the last frame: FrameRecord::status
 };
@@ -55,5 +55,11 @@ struct RunOutcome {
 /// written, disk full), `read_error` and `resources` (a file of the recording cannot be read now, or memory ran out:
 /// the run can be resumed). Everything that was committed before an error remains.
 Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks);
+
+/// Runs over a live stream until it ends, RunRequest::max_frames were processed, or RunHooks::should_stop says so. A
+/// thread reads the stream into a queue; where the queue is full, frames are dropped, those of other pairs than that of
+/// the odometry first, and counted. Codes: as run(), and those of SampleStream::read(); `usage` with
+/// RunRequest::resume, which a live stream cannot.
+Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, const RunHooks& hooks);
 
 }  // namespace spartan

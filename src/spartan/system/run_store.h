@@ -106,8 +106,8 @@ class RunStore {
   };
   /// How far the recording was read.
   struct SourcePosition {
-    std::int64_t samples_taken = 0;  ///< for FrameSource::seek()
-    std::uint64_t content_hash = 0;  ///< FrameSource::content_hash()
+    std::int64_t samples_taken = 0;  ///< for Recording::seek()
+    std::uint64_t content_hash = 0;  ///< Recording::content_hash()
   };
   /// Writes the step in one transaction, completely or not at all. Codes: `output` if the file cannot be written, was
   /// removed, or was changed by another process.

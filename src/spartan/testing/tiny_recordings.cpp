@@ -114,7 +114,7 @@ void write_tiny_spartan(const TemporaryFolder& folder, int frames, double period
   must(writer->finish());
 }
 
-CollectedSamples collect_samples(FrameSource& source) {
+CollectedSamples collect_samples(Recording& source) {
   CollectedSamples played;
   for (;;) {
     auto sample = source.next();

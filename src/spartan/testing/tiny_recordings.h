@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/rig/rig.h"
 #include "spartan/testing/temporary_folder.h"
 
@@ -38,7 +38,7 @@ struct CollectedSamples {
   std::vector<MissingFrame> missing;
   std::string error;  ///< that ended the reading; empty at the end of the source
 };
-CollectedSamples collect_samples(FrameSource& source);
+CollectedSamples collect_samples(Recording& source);
 
 /// Frame ids of the frames, or of the missing frames.
 std::vector<std::int64_t> ids_of(const std::vector<StereoFrame>& frames);

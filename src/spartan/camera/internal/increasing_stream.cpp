@@ -18,7 +18,7 @@ void IncreasingStream::look_ahead() {
     } else if (!last_ || stamp_of(**row) > *last_) {
       ahead_.push_back(std::move(**row));
     } else {
-      ++discarded_;
+      ++reversed_;
     }
   }
 }
@@ -39,11 +39,11 @@ Result<std::optional<Sample>> IncreasingStream::next() {
     Sample front = std::move(ahead_.front());
     ahead_.pop_front();
     if (discard) {
-      ++discarded_;
+      ++reversed_;
       continue;
     }
     last_ = stamp_of(front);
-    discarded_ +=
+    reversed_ +=
         static_cast<std::int64_t>(std::erase_if(ahead_, [&](const Sample& row) { return stamp_of(row) <= *last_; }));
     return std::optional(std::move(front));
   }

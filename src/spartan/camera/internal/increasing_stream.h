@@ -14,16 +14,18 @@ namespace spartan::internal {
 /// subsequence, see find_reversals()). An isolated stamp far in the future or in the past is discarded alone; it does
 /// not invalidate the samples after it. The window holds `kLookAhead` samples, so an outlier burst must be shorter than
 /// half of it.
-class IncreasingStream : public SampleStream {
+class IncreasingStream : public SensorStream {
  public:
-  explicit IncreasingStream(std::unique_ptr<SampleStream> rows) : rows_(std::move(rows)) {}
+  explicit IncreasingStream(std::unique_ptr<SensorStream> rows) : rows_(std::move(rows)) {}
 
   /// An error of the input is returned after all valid samples before it.
   Result<std::optional<Sample>> next() override;
 
-  /// Number of samples discarded so far.
-  std::int64_t discarded() const { return discarded_; }
-  UnreadableRows unreadable_rows() const override { return rows_->unreadable_rows(); }
+  DiscardedSamples discarded() const override {
+    DiscardedSamples all = rows_->discarded();
+    all.reversed += reversed_;
+    return all;
+  }
 
   static constexpr std::size_t kLookAhead = 64;  ///< samples; empirical
 
@@ -31,12 +33,12 @@ class IncreasingStream : public SampleStream {
   void look_ahead();
   bool front_is_outlier() const;
 
-  std::unique_ptr<SampleStream> rows_;
+  std::unique_ptr<SensorStream> rows_;
   std::deque<Sample> ahead_;
   std::optional<Stamp> last_;
   std::optional<Error> fault_;
   bool ended_ = false;
-  std::int64_t discarded_ = 0;
+  std::int64_t reversed_ = 0;
 };
 
 }  // namespace spartan::internal

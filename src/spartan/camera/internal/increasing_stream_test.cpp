@@ -13,7 +13,7 @@ namespace {
 using ::testing::ElementsAre;
 
 // Rows with these stamps, then an error where `truncated` is set.
-class Rows : public SampleStream {
+class Rows : public SensorStream {
  public:
   Rows(std::vector<std::int64_t> stamps, bool truncated) : stamps_(std::move(stamps)), truncated_(truncated) {}
   Result<std::optional<Sample>> next() override {
@@ -40,7 +40,7 @@ Read read(const std::vector<std::int64_t>& stamps, bool truncated = false) {
   while (true) {
     const auto row = stream.next();
     all.fault = !row;
-    all.discarded = stream.discarded();
+    all.discarded = stream.discarded().reversed;
     if (!row || !*row) return all;
     all.stamps.push_back(stamp_of(**row).ns);
   }

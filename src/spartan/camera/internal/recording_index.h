@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
 #include "spartan/camera/internal/video.h"
+#include "spartan/camera/recording.h"
 
 namespace spartan::internal {
 
@@ -31,22 +31,22 @@ struct FrameEntry {
 };
 
 /// Samples of one sensor in file order; nothing at the end.
-class SampleStream {
+class SensorStream {
  public:
-  virtual ~SampleStream() = default;
+  virtual ~SensorStream() = default;
   virtual Result<std::optional<Sample>> next() = 0;
-  /// Rows discarded so far because they cannot be parsed.
-  virtual UnreadableRows unreadable_rows() const { return {}; }
+  /// Rows discarded so far.
+  virtual DiscardedSamples discarded() const { return {}; }
 };
 /// Opens a stream at its first sample.
-using SampleStreamFactory = std::function<Result<std::unique_ptr<SampleStream>>()>;
+using SensorStreamFactory = std::function<Result<std::unique_ptr<SensorStream>>()>;
 
 /// Frames and sensor streams of a recording.
 struct RecordingIndex {
   RecordingInfo info;
   std::vector<FrameEntry> frames;                  ///< in file order until validate_and_sort()
-  SampleStreamFactory imu;                         ///< empty: no IMU
-  std::vector<SampleStreamFactory> other_sensors;  ///< wheels, compass, inclinometer
+  SensorStreamFactory imu;                         ///< empty: no IMU
+  std::vector<SensorStreamFactory> other_sensors;  ///< wheels, compass, inclinometer
   std::shared_ptr<StereoVideo> video;              ///< decodes the frames; null: the files are images
   std::vector<std::string> sensor_files;           ///< tables of all sensors; their bytes are part of listing_hash()
 };
@@ -75,7 +75,7 @@ std::optional<LayoutChoice> recognise_images(const std::filesystem::path& folder
 Status validate_and_sort(RecordingIndex& index, double pair_tolerance_s);
 
 /// Plays an index that validate_and_sort() has sorted.
-std::unique_ptr<FrameSource> make_indexed_source(RecordingIndex index);
+std::unique_ptr<Recording> make_indexed_recording(RecordingIndex index);
 
 /// The pair that frames of a layout without pair names belong to: the first odometry pair of the rig, else the first.
 std::string default_pair(const Rig& rig);

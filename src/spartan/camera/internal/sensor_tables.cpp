@@ -7,7 +7,7 @@
 namespace spartan::internal {
 namespace {
 
-class TableStream : public SampleStream {
+class TableStream : public SensorStream {
  public:
   TableStream(TableReader table, std::size_t fields, RowReader read_row)
       : table_(std::move(table)), fields_(fields), read_row_(std::move(read_row)) {}
@@ -27,17 +27,17 @@ class TableStream : public SampleStream {
     }
   }
 
-  UnreadableRows unreadable_rows() const override { return unreadable_; }
+  DiscardedSamples discarded() const override { return discarded_; }
 
  private:
   void leave_out(const std::string& fault) {
-    if (++unreadable_.count == 1) unreadable_.first = fault;
+    if (++discarded_.unreadable == 1) discarded_.first_unreadable = fault;
   }
 
   TableReader table_;
   std::size_t fields_;
   RowReader read_row_;
-  UnreadableRows unreadable_;
+  DiscardedSamples discarded_;
 };
 
 Result<Stamp> stamp_field(std::string_view text) {
@@ -70,9 +70,9 @@ Result<Sample> read_row(const std::vector<std::string_view>& row, Make make) {
 
 }  // namespace
 
-SampleStreamFactory stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
+SensorStreamFactory stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
                                     const RowReader& read_row) {
-  return [=]() -> Result<std::unique_ptr<SampleStream>> {
+  return [=]() -> Result<std::unique_ptr<SensorStream>> {
     auto table = TableReader::open(path, format);
     if (!table) return failure(table);
     return std::make_unique<TableStream>(std::move(*table), fields, read_row);

@@ -14,7 +14,7 @@ using RowReader = std::function<Result<Sample>(const std::vector<std::string_vie
 
 /// Opens a stream over a table whose rows have at least `fields` fields. Rows that cannot be parsed are discarded and
 /// counted. Codes as TableReader::open().
-SampleStreamFactory stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
+SensorStreamFactory stream_of_table(const std::string& path, const TableFormat& format, std::size_t fields,
                                     const RowReader& read_row);
 
 /// IMU rows: stamp_ns, angular rate x y z (rad/s), specific force x y z (m/s²). `body_from_imu` rotates both into the

@@ -14,7 +14,7 @@ using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 
 // All samples of a table, or the error that ends it.
-Result<std::vector<Sample>> read_all(const SampleStreamFactory& open) {
+Result<std::vector<Sample>> read_all(const SensorStreamFactory& open) {
   auto stream = open();
   if (!stream) return failure(stream);
   std::vector<Sample> samples;
@@ -39,8 +39,8 @@ class SensorTables : public ::testing::Test {
     int count = 0;
     for (auto sample = (*stream)->next(); sample && *sample; sample = (*stream)->next()) ++count;
     EXPECT_EQ(count, read);
-    EXPECT_EQ((*stream)->unreadable_rows().count, unreadable);
-    return (*stream)->unreadable_rows().first;
+    EXPECT_EQ((*stream)->discarded().unreadable, unreadable);
+    return (*stream)->discarded().first_unreadable;
   }
   TemporaryFolder folder_;
 };

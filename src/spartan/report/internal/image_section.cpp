@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kDriveImages = 6, kTerrainViews = 3;
 
 // One view of the terrain: the rectified left image beside its disparities.
-Result<std::string> terrain_figures(const TerrainRecord& view, const std::string& folder, FrameSource& source,
+Result<std::string> terrain_figures(const TerrainRecord& view, const std::string& folder, Recording& source,
                                     Imager& imager) {
   const auto disparity = read_pfm(folder + "/" + std::to_string(view.stamp.ns) + ".pfm");
   if (!disparity) return failure(disparity);
@@ -41,7 +41,7 @@ Result<std::string> terrain_figures(const TerrainRecord& view, const std::string
 }  // namespace
 
 // The left images along the drive.
-Result<std::string> image_section(FrameSource& source, Imager& imager) {
+Result<std::string> image_section(Recording& source, Imager& imager) {
   std::string html = "<div class=\"images\">";
   for (const StereoPair& pair : source.info().rig.pairs) {
     if (!pair.for_odometry) continue;
@@ -60,7 +60,7 @@ Result<std::string> image_section(FrameSource& source, Imager& imager) {
   return html + "</div>\n";
 }
 
-Result<std::string> terrain_section(FrameSource& source, Imager& imager, const std::string& run, RunStore& store) {
+Result<std::string> terrain_section(Recording& source, Imager& imager, const std::string& run, RunStore& store) {
   const auto views = store.terrain();
   if (!views) return failure(views);
   if (views->empty()) return std::string();

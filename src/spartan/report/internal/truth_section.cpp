@@ -38,8 +38,7 @@ Image<Rgb8> error_image(ImageView<const float> estimate, ImageView<const float> 
 }
 
 // One frame of a pair with true disparities: disparity, error, scores.
-Result<std::string> stereo_of(FrameSource& source, Imager& imager, const StereoPair& pair,
-                              const ReportRequest& request) {
+Result<std::string> stereo_of(Recording& source, Imager& imager, const StereoPair& pair, const ReportRequest& request) {
   const std::vector<Stamp> stamps = source.listed_stamps(pair.name);
   if (stamps.empty()) return std::string();
   const Stamp stamp = stamps[stamps.size() / 2];
@@ -97,7 +96,7 @@ std::string elevation_of(const std::string& recording, const Trajectory& truth) 
 
 }  // namespace
 
-Result<std::string> truth_section(FrameSource& source, Imager& imager, const ReportRequest& request) {
+Result<std::string> truth_section(Recording& source, Imager& imager, const ReportRequest& request) {
   std::string stereo;
   for (const StereoPair& pair : source.info().rig.pairs) {
     const auto html = stereo_of(source, imager, pair, request);

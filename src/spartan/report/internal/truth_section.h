@@ -3,13 +3,13 @@
 
 #include <string>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/result.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/report/report.h"
 
 namespace spartan::internal {
 
-Result<std::string> truth_section(FrameSource& source, Imager& imager, const ReportRequest& request);
+Result<std::string> truth_section(Recording& source, Imager& imager, const ReportRequest& request);
 
 }  // namespace spartan::internal

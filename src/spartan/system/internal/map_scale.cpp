@@ -20,7 +20,7 @@ constexpr double kCellsPerSide = 160, kCellsPerHeight = 8;
 constexpr double kCellOfDefaults_m = 0.05;  // for which the defaults of mapping and slam were chosen
 constexpr double kLeastHeight_m = 0.05;     // of a camera; a rig that states less does not state it
 constexpr double kLeastUpright = 0.5;       // of the up axis of the image along the normal of the ground: 60°
-constexpr int kMostFrames = 5;              // that are searched for a ground plane
+constexpr std::size_t kMostFrames = 5;      // that are searched for a ground plane
 
 // The nearest of 1, 1.2, 1.5 … 8 times a power of ten, by ratio.
 double rounded(double value) {
@@ -55,11 +55,10 @@ struct SeenPair {
   std::optional<Eigen::Vector3d> up_in_body;  // with height_by_images
 };
 
-Result<std::optional<SeenPair>> look(FrameSource& source, Imager& imager, StopMapper& mapper, const StereoPair& pair) {
+Result<std::optional<SeenPair>> look(SampleStream& source, Imager& imager, StopMapper& mapper, const StereoPair& pair) {
   std::optional<SeenPair> seen;
-  const std::vector<Stamp> stamps = source.listed_stamps(pair.name);
-  for (std::size_t i = 0; i < std::min<std::size_t>(kMostFrames, stamps.size()); ++i) {
-    const auto frame = source.frame_at(pair.name, stamps[i]);
+  for (std::size_t i = 0; i < std::min(kMostFrames, source.previews(pair.name)); ++i) {
+    const auto frame = source.preview(pair.name, i);
     if (!frame && frame.error().code != ErrorCode::input) return failure(frame);
     if (!frame) continue;
     const auto rectified = imager.process(*frame);
@@ -99,8 +98,8 @@ MapScale map_scale(std::span<const PairOverGround> pairs) {
   return scale;
 }
 
-Result<MapScale> map_scale_of(FrameSource& source, const Rig& rig, const RunOptions& options, const ThreadPool& workers,
-                              const std::string& mask_folder) {
+Result<MapScale> map_scale_of(SampleStream& source, const Rig& rig, const RunOptions& options,
+                              const ThreadPool& workers, const std::string& mask_folder) {
   auto imager = Imager::create(rig, options.imaging, workers, mask_folder);
   if (!imager) return failure(imager);
   auto mapper = StopMapper::create(options.reconstruction, options.mapping, workers);

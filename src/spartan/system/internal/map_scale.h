@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/sample_stream.h"
 #include "spartan/core/options.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
@@ -38,11 +38,11 @@ struct MapScale {
 /// of ten: a mast of 1 m with the wide pair of the paper has 8 m and 5 cm, the camera of a car (KITTI) 60 m and 20 cm.
 MapScale map_scale(std::span<const PairOverGround> pairs);
 
-/// map_scale() of a recording: heights are those of the rig where it has a body on the ground, else that of the ground
-/// plane in the disparity images of the first frames. `rig`: that of the recording, its rows may be aligned. Codes are
+/// map_scale() of a stream: heights are those of the rig where it has a body on the ground, else that of the ground
+/// plane in the disparity images of the first frames. `rig`: that of the stream, its rows may be aligned. Codes are
 /// those of reading frames.
-Result<MapScale> map_scale_of(FrameSource& source, const Rig& rig, const RunOptions& options, const ThreadPool& workers,
-                              const std::string& mask_folder);
+Result<MapScale> map_scale_of(SampleStream& source, const Rig& rig, const RunOptions& options,
+                              const ThreadPool& workers, const std::string& mask_folder);
 
 /// Options whose keys were not given and that have their defaults take the scale: side, cell, heights of obstacles and
 /// cavities (two cells), and all lengths of mapping and map matching, which were chosen for cells of 5 cm.

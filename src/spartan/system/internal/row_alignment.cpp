@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "spartan/calibration/pair_check.h"
-#include "spartan/calibration/pair_inspection.h"
 #include "spartan/imaging/imager.h"
 
 namespace spartan::internal {
@@ -22,12 +21,11 @@ struct GrayFrame {
   Image<std::uint8_t> left, right;
 };
 
-Result<std::vector<GrayFrame>> first_frames(FrameSource& source, Imager& imager, const std::string& pair) {
-  const std::vector<Stamp> stamps = source.listed_stamps(pair);
-  const std::size_t count = std::min(stamps.size(), kFirstFrames), used = std::min(count, kUsedFrames);
+Result<std::vector<GrayFrame>> first_frames(SampleStream& source, Imager& imager, const std::string& pair) {
+  const std::size_t count = std::min(source.previews(pair), kFirstFrames), used = std::min(count, kUsedFrames);
   std::vector<GrayFrame> frames;
   for (std::size_t i = 0; i < used; ++i) {
-    const auto frame = source.frame_at(pair, stamps[i * count / used]);
+    const auto frame = source.preview(pair, i * count / used);
     if (!frame && frame.error().code != ErrorCode::input) return failure(frame);
     if (!frame) continue;
     const auto gray = imager.process(*frame);
@@ -49,7 +47,7 @@ std::string to_text(const std::string& pair, const RowAlignment& alignment) {
 
 }  // namespace
 
-Result<AlignedRig> align_rows_of(FrameSource& source, const ThreadPool& workers) {
+Result<AlignedRig> align_rows_of(SampleStream& source, const ThreadPool& workers) {
   AlignedRig result{source.info().rig, {}};
   ImagingOptions options;
   options.rectify = false;

@@ -20,6 +20,8 @@ constexpr double kAlignmentSeconds = 1;
 // Number of frames from one checkpoint to the next; the first frame has one, too. The state of the pipeline is large
 // (some 1 MB at 1200 landmarks), and to process so many frames again after a crash takes little time.
 constexpr int kFramesPerCheckpoint = 250;
+// A live run looks so often whether it should stop.
+constexpr std::chrono::milliseconds kStopPoll{50};
 
 LocalizationRecord localization_record(const LocalizationEstimate& estimate) {
   LocalizationRecord record;
@@ -41,12 +43,14 @@ LocalizationRecord localization_record(const LocalizationEstimate& estimate) {
 
 Status RunLoop::begin() {
   pipeline_.store_maps_in(store_.tiles());
-  total_frames_ = static_cast<int>(source_.listed_stamps(pipeline_.odometry_pair()).size());
-  if (request_.max_frames > 0) total_frames_ = std::min(total_frames_, request_.max_frames);
+  total_frames_ = recording_ ? static_cast<int>(recording_->listed_stamps(pipeline_.odometry_pair()).size()) : 0;
+  if (request_.max_frames > 0)
+    total_frames_ = recording_ ? std::min(total_frames_, request_.max_frames) : request_.max_frames;
   auto checkpoint = store_.checkpoint();
   if (!checkpoint) return failure(checkpoint);
   if (!*checkpoint) {
-    const auto imu = source_.imu_samples({}, kAlignmentSeconds);
+    if (!recording_) return {};
+    const auto imu = recording_->imu_samples({}, kAlignmentSeconds);
     if (!imu) return failure(imu);
     pipeline_.align_with_gravity(*imu);
     return {};
@@ -64,7 +68,7 @@ Status RunLoop::begin() {
   for (const FrameRecord& frame : *frames) usable_frames_ += frame.status != "missing";
   if (Status status = pipeline_.restore((*checkpoint)->pipeline_state, store_.tiles()); !status) return status;
   for (const FrameKey& key : pipeline_.pending_frames()) {
-    const auto frame = source_.frame_at(key.pair, key.left_stamp);
+    const auto frame = recording_->frame_at(key.pair, key.left_stamp);
     if (!frame) return failure(frame);
     if (Status status = pipeline_.restore_frame(*frame); !status) return status;
   }
@@ -72,12 +76,16 @@ Status RunLoop::begin() {
   elapsed_before_ = (*checkpoint)->elapsed;
   resumed_ = true;
   hooks_.log.info(fmt::format("resuming after frame {}", frames->back().frame_id));
-  if (Status sought = source_.seek(samples_taken_); !sought) return sought;
-  if (source_.content_hash() == (*checkpoint)->source.content_hash) return {};
+  return seek(**checkpoint);
+}
+
+Status RunLoop::seek(const RunStore::Checkpoint& checkpoint) {
+  if (Status sought = recording_->seek(checkpoint.source.samples_taken); !sought) return sought;
+  if (recording_->content_hash() == checkpoint.source.content_hash) return {};
   return failure(ErrorCode::configuration,
                  "the recording is not the one that the run began with: an image or a row of a sensor table that was "
                  "processed has changed",
-                 source_.info().path, "restore the recording, or run into a new folder");
+                 stream_.info().path, "restore the recording, or run into a new folder");
 }
 
 ElapsedTime RunLoop::elapsed() const {
@@ -97,13 +105,21 @@ Status RunLoop::process_until_end() {
       stopped_ = true;
       return {};
     }
-    const auto sample = clock_.measure("camera", [&] { return source_.next(); });
-    if (!sample) return failure(sample);
-    if (!*sample) return finish();
+    const auto read = this->read();
+    if (!read) return failure(read);
+    if (read->state == StreamRead::State::end) return finish();
+    if (read->state == StreamRead::State::none_yet) continue;
     ++samples_taken_;
-    if (Status status = process(**sample); !status) return status;
+    arrived_ = read->arrived;
+    if (Status status = process(*read->sample); !status) return status;
   }
   return {};
+}
+
+// The time of waiting for a live sample is not that of a stage.
+Result<StreamRead> RunLoop::read() {
+  if (!recording_) return stream_.read(kStopPoll);
+  return clock_.measure("camera", [&] { return stream_.read({}); });
 }
 
 // Commits what is complete only at the end of the recording: the map of the last stop and the stage times since the
@@ -178,6 +194,7 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
     return {};
   }
   FrameResult& output = **result;
+  if (!recording_) latencies_.add(arrived_, std::chrono::steady_clock::now(), frame.position_id >= 0);
   ++usable_frames_;
   RunStore::Step step;
   FrameRecord& record = step.frame.emplace();
@@ -256,7 +273,7 @@ Status RunLoop::checkpoint(const RunStore::Step& step) {
     if (Status flushed = pipeline_.flush_maps(); !flushed) return failure(flushed);
     return pipeline_.save();
   };
-  Status status = store_.commit(step, save, {samples_taken_, source_.content_hash()}, elapsed());
+  Status status = store_.commit(step, save, {samples_taken_, recording_ ? recording_->content_hash() : 0}, elapsed());
   if (status) frames_since_checkpoint_ = 0;
   return status;
 }

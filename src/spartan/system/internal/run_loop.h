@@ -1,4 +1,4 @@
-// The loop of a run over the samples of its recording.
+// The loop of a run over the samples of its stream.
 #pragma once
 
 #include <chrono>
@@ -9,9 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
+#include "spartan/camera/sample_stream.h"
 #include "spartan/core/result.h"
 #include "spartan/core/stage_clock.h"
+#include "spartan/system/internal/latency_record.h"
 #include "spartan/system/pipeline.h"
 #include "spartan/system/run.h"
 #include "spartan/system/run_folder.h"
@@ -19,16 +21,19 @@
 
 namespace spartan::internal {
 
-/// Feeds the samples of a recording to the pipeline and commits every result to the store, and now and then the state
+/// Feeds the samples of a stream to the pipeline and commits every result to the store, and now and then the state
 /// of the pipeline.
 class RunLoop {
  public:
-  /// `start`, `start_cpu_s`: when this execution of the run began (core/stage_clock.h).
-  RunLoop(const RunRequest& request, const RunHooks& hooks, FrameSource& source, Pipeline pipeline, RunStore store,
-          RunFolder folder, std::chrono::steady_clock::time_point start, double start_cpu_s)
+  /// `recording`: the stream, where it is one that can be resumed. `start`, `start_cpu_s`: when this execution of the
+  /// run began (core/stage_clock.h).
+  RunLoop(const RunRequest& request, const RunHooks& hooks, SampleStream& stream, Recording* recording,
+          Pipeline pipeline, RunStore store, RunFolder folder, std::chrono::steady_clock::time_point start,
+          double start_cpu_s)
       : request_(request),
         hooks_(hooks),
-        source_(source),
+        stream_(stream),
+        recording_(recording),
         pipeline_(std::move(pipeline)),
         store_(std::move(store)),
         folder_(std::move(folder)),
@@ -50,11 +55,15 @@ class RunLoop {
   std::optional<std::int64_t> resumed_from_frame() const { return resumed_from_frame_; }
   /// Since the run began, without what an interrupted execution did after its last commit.
   ElapsedTime elapsed() const;
+  /// Of a live run.
+  const LatencyRecord& latencies() const { return latencies_; }
   RunStore& store() { return store_; }
   GlobalMap& global_map() { return pipeline_.global_map(); }
 
  private:
   Status process_until_end();
+  Result<StreamRead> read();
+  Status seek(const RunStore::Checkpoint& checkpoint);
   Status process(const Sample& sample);
   Status finish();
   Result<MapRecord> write_map_of(const MappedStop& stop);
@@ -69,7 +78,8 @@ class RunLoop {
 
   const RunRequest& request_;
   const RunHooks& hooks_;
-  FrameSource& source_;
+  SampleStream& stream_;
+  Recording* recording_;  // null: live
   Pipeline pipeline_;
   RunStore store_;
   RunFolder folder_;
@@ -78,7 +88,7 @@ class RunLoop {
   ElapsedTime elapsed_before_;  // this execution
   StageClock clock_;
   std::vector<StageTime> view_times_;  // of views of a stop since the last frame of the odometry pair
-  std::int64_t samples_taken_ = 0;     // number of samples read from the source
+  std::int64_t samples_taken_ = 0;     // number of samples read from the stream
   int frames_ = 0;                     // frames of the odometry pair, missing ones included
   int total_frames_ = 0;               // listed frames of the odometry pair, at most max_frames
   double distance_m_ = 0;              // path length of the odometry
@@ -86,6 +96,8 @@ class RunLoop {
   int frames_since_checkpoint_ = 0;
   int usable_frames_ = 0;  // frames of the odometry pair that were processed
   std::string first_error_;
+  std::chrono::steady_clock::time_point arrived_;  // of the sample that is processed
+  LatencyRecord latencies_;
   bool stopped_ = false;
   bool complete_ = false;
   bool resumed_ = false;

@@ -16,18 +16,18 @@ namespace spartan::internal {
 namespace {
 
 // Stops need frames of another pair than that of the odometry.
-MapSource map_source(const FrameSource& source, const RunOptions& options) {
+MapSource map_source(const SampleStream& source, const RunOptions& options) {
   const Rig& rig = source.info().rig;
   const StereoPair* const odometry = odometry_pair_of(rig, options);
   if (options.maps_from != MapSource::automatic || odometry == nullptr) return options.maps_from;
   const bool stops = std::any_of(rig.pairs.begin(), rig.pairs.end(), [&](const StereoPair& pair) {
-    return pair.name != odometry->name && !source.listed_stamps(pair.name).empty();
+    return pair.name != odometry->name && source.previews(pair.name) > 0;
   });
   return stops ? MapSource::stops : MapSource::keyframes;
 }
 
-RunOptions options_of(const FrameSource& source, const RunRequest& request) {
-  const RecordingInfo& info = source.info();
+RunOptions options_of(const SampleStream& source, const RunRequest& request) {
+  const StreamInfo& info = source.info();
   RunOptions options = request.options;
   options.maps_from = map_source(source, options);
   if (options.gravity_m_s2 == 0) options.gravity_m_s2 = info.gravity_m_s2.value_or(0);
@@ -50,8 +50,8 @@ std::string level_text(const Eigen::Vector3d& up_in_body) {
 
 }  // namespace
 
-Result<RunSetup> set_up_run(FrameSource& source, const RunRequest& request, const ThreadPool& workers) {
-  const RecordingInfo& info = source.info();
+Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers) {
+  const StreamInfo& info = source.info();
   const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
   RunOptions options = options_of(source, request);
   auto pipeline = Pipeline::create(info.rig, options, workers, mask_folder);

@@ -1,4 +1,4 @@
-// What a run computes with, chosen by the recording and its first frames.
+// What a run computes with, chosen by its stream and the first frames.
 #pragma once
 
 #include <Eigen/Core>
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/sample_stream.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
 #include "spartan/rig/rig.h"
@@ -26,6 +26,6 @@ struct RunSetup {
 
 /// Checks that the run fits into memory and that its folder can be used before anything takes long. Codes: `usage`,
 /// `input`, `output`, `resources`.
-Result<RunSetup> set_up_run(FrameSource& source, const RunRequest& request, const ThreadPool& workers);
+Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers);
 
 }  // namespace spartan::internal

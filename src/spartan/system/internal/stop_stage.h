@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/archive.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"

@@ -52,6 +52,26 @@ Json stages(const std::vector<FrameRecord>& frames) {
   return json;
 }
 
+Json latency(const std::vector<float>& values_ms) {
+  const std::vector<double> values(values_ms.begin(), values_ms.end());
+  return {{"count", values.size()},
+          {"median", percentile(values, 0.5)},
+          {"p99", percentile(values, 0.99)},
+          {"max", percentile(values, 1)}};
+}
+
+// Null of a recording.
+Json live(const std::optional<LiveFacts>& facts) {
+  if (!facts) return nullptr;
+  return {{"latency_ms", latency(facts->latencies.all_ms)},
+          {"latency_at_stops_ms", latency(facts->latencies.at_stops_ms)},
+          {"dropped",
+           {{"odometry", facts->dropped.odometry},
+            {"views", facts->dropped.views},
+            {"sensor_samples", facts->dropped.sensor_samples}}},
+          {"queue_peak_bytes", facts->queue_peak_bytes}};
+}
+
 // Consecutive frames without a pose.
 struct GapWithoutPose {
   int frames = 0;
@@ -159,6 +179,7 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"peak_memory_bytes", facts.peak_memory_bytes},
       {"threads", facts.threads},
       {"absent", facts.absent},
+      {"live", live(facts.live)},
       {"stages", stages(frames)},
       {"health",
        {{"odometry", health}, {"localization", sensors}, {"wheel_slip", wheel_slip(frames, facts.slip_alarm)}}},

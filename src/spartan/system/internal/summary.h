@@ -7,9 +7,18 @@
 #include <vector>
 
 #include "spartan/core/time.h"
+#include "spartan/system/internal/latency_record.h"
+#include "spartan/system/internal/sample_queue.h"
 #include "spartan/system/run_store.h"
 
 namespace spartan::internal {
+
+/// What only a live run has.
+struct LiveFacts {
+  LatencyRecord latencies;
+  DroppedFrames dropped;
+  std::size_t queue_peak_bytes = 0;
+};
 
 /// Facts about a run that are not in its store.
 struct RunFacts {
@@ -26,6 +35,7 @@ struct RunFacts {
   std::int64_t peak_memory_bytes = 0;
   /// Rows of sensor tables that were discarded: stamps that do not increase, and rows that cannot be parsed.
   std::int64_t sensor_rows_reversed = 0, sensor_rows_unreadable = 0;
+  std::optional<LiveFacts> live;
   std::optional<std::int64_t> resumed_from_frame;  ///< frame_id of the first frame processed after --resume
 };
 

@@ -23,7 +23,7 @@ Result<std::vector<Stamp>> read_stamps(const std::string& path) {
 
 // OXTS files hold one sample each: 30 numbers, of which (counted from 0) 11 … 13 are the acceleration and 17 … 19 the
 // angular rate along x, y, z of the unit.
-class OxtsStream : public SampleStream {
+class OxtsStream : public SensorStream {
  public:
   OxtsStream(fs::path folder, std::vector<Stamp> stamps) : folder_(std::move(folder)), stamps_(std::move(stamps)) {}
 
@@ -110,7 +110,7 @@ Result<RecordingIndex> index_kitti_raw(const LayoutChoice& layout, const OpenOpt
   const bool body_is_imu = index.info.rig.convention == PoseConvention::body;
   if (const fs::path oxts = folder / "oxts"; body_is_imu && fs::exists(oxts / "timestamps.txt", error)) {
     index.sensor_files.push_back((oxts / "timestamps.txt").string());
-    index.imu = [oxts]() -> Result<std::unique_ptr<SampleStream>> {
+    index.imu = [oxts]() -> Result<std::unique_ptr<SensorStream>> {
       auto stamps = read_stamps((oxts / "timestamps.txt").string());
       if (!stamps) return failure(stamps);
       return std::make_unique<OxtsStream>(oxts / "data", std::move(*stamps));

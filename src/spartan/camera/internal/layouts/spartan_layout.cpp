@@ -84,14 +84,14 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
 
   const fs::path sensors = folder / "sensors";
   const auto stream = [&](const char* name, const char* header, std::size_t fields,
-                          const RowReader& reader) -> SampleStreamFactory {
+                          const RowReader& reader) -> SensorStreamFactory {
     if (!fs::exists(sensors / name, error)) return {};
     index.sensor_files.push_back((sensors / name).string());
     return stream_of_table((sensors / name).string(), {.separator = ',', .header = header, .ends_with_newline = true},
                            fields, reader);
   };
   index.imu = stream("imu.csv", kImuHeader, 7, read_imu_row(index.info.rig.imu.body_from_imu.rotation()));
-  for (SampleStreamFactory other : {stream("wheels.csv", kWheelsHeader, 3, read_wheel_row),
+  for (SensorStreamFactory other : {stream("wheels.csv", kWheelsHeader, 3, read_wheel_row),
                                     stream("compass.csv", kCompassHeader, 3, read_compass_row),
                                     stream("inclinometer.csv", kInclinometerHeader, 4, read_inclinometer_row)}) {
     if (other) index.other_sensors.push_back(std::move(other));

@@ -1,13 +1,13 @@
-// FrameSource: one interface to the stereo frames and sensor samples of a recording, whatever its folder layout.
+// Recording: the stereo frames and sensor samples of a recording, whatever its folder layout.
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "spartan/camera/sample_stream.h"
 #include "spartan/camera/samples.h"
 #include "spartan/core/frame_image.h"
 #include "spartan/core/result.h"
@@ -38,41 +38,24 @@ struct SequenceReport {
 };
 
 /// Properties of an open recording.
-struct RecordingInfo {
-  std::string path;
+struct RecordingInfo : StreamInfo {
   RecordingFormat format = RecordingFormat::spartan;
   std::string layout_reason;  ///< why this layout was chosen, e.g. "calib.txt and image_0 found"
-  Rig rig;
-  std::string rig_source;              ///< the file that the rig was read from
-  std::string name;                    ///< from recording.yaml, else the folder's name
-  std::string description;             ///< from recording.yaml, else empty
-  std::optional<double> gravity_m_s2;  ///< from recording.yaml
-  SensorNoise noise;                   ///< specified noise, from recording.yaml or imu0/sensor.yaml
-  bool has_imu = false;
   SequenceReport sequence;
   std::string truth_file;  ///< ground-truth trajectory of the recording; empty without one
-};
-
-/// Identifies one stereo frame of a recording, see FrameSource::frame_at().
-struct FrameKey {
-  std::string pair;
-  Stamp left_stamp;
-};
-
-/// Rows of sensor tables that are discarded because they cannot be parsed.
-struct UnreadableRows {
-  std::int64_t count = 0;
-  std::string first;  ///< file, line and fault of the first one
 };
 
 /// Yields samples ordered by stamp. At equal stamps the order is IMU, wheels, compass, inclinometer, then frames in the
 /// order in which the recording lists them. A frame with a reversed stamp is played after the frame listed before it.
 /// Sensor samples (not frames) whose stamps do not increase within their table are discarded, as few as possible.
-class FrameSource {
+class Recording : public SampleStream {
  public:
-  virtual ~FrameSource() = default;
+  const RecordingInfo& info() const override = 0;
 
-  virtual const RecordingInfo& info() const = 0;
+  /// next(), which never waits.
+  Result<StreamRead> read(std::chrono::nanoseconds timeout) final;
+  std::size_t previews(const std::string& pair) const final { return listed_stamps(pair).size(); }
+  Result<StereoFrame> preview(const std::string& pair, std::size_t index) final;
 
   /// The next sample, or nothing at the end. A listed frame that is missing, unreadable, of another size or out of
   /// order is delivered as MissingFrame. Rows of sensor tables that cannot be parsed are discarded and counted. Errors:
@@ -99,12 +82,6 @@ class FrameSource {
   /// position.
   virtual Result<std::vector<ImuSample>> imu_samples(std::optional<Stamp> from, double seconds) = 0;
 
-  /// Number of sensor samples discarded so far because their stamps did not increase.
-  virtual std::int64_t sensor_samples_discarded() const = 0;
-
-  /// Rows of sensor tables discarded so far.
-  virtual UnreadableRows unreadable_sensor_rows() const = 0;
-
   /// Hash of the layout, of all listed frames, with their stamps and the names of their files inside the recording, and
   /// of the names and bytes of the sensor tables. Identifies a recording without reading its images, wherever its
   /// folder is. Codes: `read_error`, `resources` (a table cannot be read).
@@ -130,7 +107,7 @@ struct OpenOptions {
 
 /// Opens a recording: a folder, or a video file with the left and the right image side by side. Codes: `input`
 /// (missing, empty or of unknown layout), `configuration` (calibration).
-Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, const OpenOptions& options = {});
+Result<std::unique_ptr<Recording>> open_recording(const std::string& path, const OpenOptions& options = {});
 
 /// Relabels an image of read_image() with the pixel format of the camera that took it. An image file states only the
 /// bits of storage of a sample. The number of significant bits and the Bayer pattern come from the rig (`camera`) and

@@ -1,5 +1,5 @@
 // Detection of the folder layout, and its errors.
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

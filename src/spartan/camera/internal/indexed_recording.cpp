@@ -8,10 +8,10 @@
 #include <variant>
 #include <vector>
 
-#include "spartan/camera/frame_source.h"
 #include "spartan/camera/internal/content_hash.h"
 #include "spartan/camera/internal/increasing_stream.h"
 #include "spartan/camera/internal/recording_index.h"
+#include "spartan/camera/recording.h"
 #include "spartan/core/archive.h"
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 // A sensor stream with its next sample.
 class SensorHead {
  public:
-  explicit SensorHead(SampleStreamFactory open) : open_(std::move(open)) {}
+  explicit SensorHead(SensorStreamFactory open) : open_(std::move(open)) {}
 
   Status rewind() {
     auto stream = open_();
@@ -39,11 +39,10 @@ class SensorHead {
     return {};
   }
   const std::optional<Sample>& head() const { return head_; }
-  std::int64_t discarded() const { return stream_ ? stream_->discarded() : 0; }
-  UnreadableRows unreadable_rows() const { return stream_ ? stream_->unreadable_rows() : UnreadableRows{}; }
+  DiscardedSamples discarded() const { return stream_ ? stream_->discarded() : DiscardedSamples{}; }
 
  private:
-  SampleStreamFactory open_;
+  SensorStreamFactory open_;
   std::optional<IncreasingStream> stream_;
   std::optional<Sample> head_;
 };
@@ -106,11 +105,11 @@ Status add_content(Hash64& hash, const std::string& path) {
   }
 }
 
-class IndexedSource : public FrameSource {
+class IndexedRecording : public Recording {
  public:
-  explicit IndexedSource(RecordingIndex index) : index_(std::move(index)) {
+  explicit IndexedRecording(RecordingIndex index) : index_(std::move(index)) {
     if (index_.imu) sensors_.emplace_back(index_.imu);
-    for (const SampleStreamFactory& open : index_.other_sensors) sensors_.emplace_back(open);
+    for (const SensorStreamFactory& open : index_.other_sensors) sensors_.emplace_back(open);
   }
 
   const RecordingInfo& info() const override { return index_.info; }
@@ -197,18 +196,13 @@ class IndexedSource : public FrameSource {
     return samples;
   }
 
-  std::int64_t sensor_samples_discarded() const override {
-    std::int64_t sum = 0;
-    for (const SensorHead& sensor : sensors_) sum += sensor.discarded();
-    return sum;
-  }
-
-  UnreadableRows unreadable_sensor_rows() const override {
-    UnreadableRows all;
+  DiscardedSamples discarded() const override {
+    DiscardedSamples all;
     for (const SensorHead& sensor : sensors_) {
-      const UnreadableRows rows = sensor.unreadable_rows();
-      if (all.count == 0) all.first = rows.first;
-      all.count += rows.count;
+      const DiscardedSamples of = sensor.discarded();
+      if (all.unreadable == 0) all.first_unreadable = of.first_unreadable;
+      all.unreadable += of.unreadable;
+      all.reversed += of.reversed;
     }
     return all;
   }
@@ -325,8 +319,8 @@ class IndexedSource : public FrameSource {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> make_indexed_source(RecordingIndex index) {
-  return std::make_unique<IndexedSource>(std::move(index));
+std::unique_ptr<Recording> make_indexed_recording(RecordingIndex index) {
+  return std::make_unique<IndexedRecording>(std::move(index));
 }
 
 }  // namespace spartan::internal

@@ -1,4 +1,4 @@
-#include "spartan/camera/frame_source.h"
+#include "spartan/camera/recording.h"
 
 #include <fmt/format.h>
 
@@ -159,7 +159,7 @@ Result<RecordingFormat> parse_recording_format(std::string_view name) {
   return failure(ErrorCode::usage, fmt::format("unknown recording format '{}'", name), {}, "choose one of " + known);
 }
 
-Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, const OpenOptions& options) {
+Result<std::unique_ptr<Recording>> open_recording(const std::string& path, const OpenOptions& options) {
   const auto layout = choose_layout(path, options);
   if (!layout) return failure(layout);
   auto index = entry_of(layout->format).index(*layout, options);
@@ -173,7 +173,21 @@ Result<std::unique_ptr<FrameSource>> open_recording(const std::string& path, con
   if (info.name.empty()) info.name = fs::weakly_canonical(path, error).filename().string();
   if (Status status = validate_and_sort(*index, options.pair_tolerance_s); !status) return failure(status);
   if (Status status = set_sample_depth(*index, options.bits); !status) return failure(status);
-  return make_indexed_source(std::move(*index));
+  return make_indexed_recording(std::move(*index));
+}
+
+Result<StreamRead> Recording::read(std::chrono::nanoseconds /*timeout*/) {
+  auto sample = next();
+  if (!sample) return failure(sample);
+  StreamRead read{StreamRead::State::end, std::move(*sample), std::chrono::steady_clock::now()};
+  if (read.sample) read.state = StreamRead::State::sample;
+  return read;
+}
+
+Result<StereoFrame> Recording::preview(const std::string& pair, std::size_t index) {
+  const std::vector<Stamp> stamps = listed_stamps(pair);
+  if (index < stamps.size()) return frame_at(pair, stamps[index]);
+  return failure(ErrorCode::input, fmt::format("has no frame {} of pair '{}'", index, pair), info().path);
 }
 
 }  // namespace spartan

@@ -1,0 +1,123 @@
+#include "spartan/camera/internal/replay_stream.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <thread>
+#include <utility>
+#include <variant>
+
+namespace spartan::internal {
+namespace {
+
+using std::chrono::nanoseconds;
+
+// From the last sample of a pass to the first one of the next where the recording tells no interval.
+constexpr double kPause_s = 0.1;
+
+nanoseconds scaled(double seconds, double speed) {
+  return nanoseconds(static_cast<std::int64_t>(seconds / speed * 1e9));
+}
+
+}  // namespace
+
+ReplayClock ReplayClock::real() {
+  return {[] { return std::chrono::steady_clock::now(); }, [](Time time) { std::this_thread::sleep_until(time); }};
+}
+
+ReplayStream::ReplayStream(std::unique_ptr<Recording> recording, double speed, int passes, ReplayClock clock)
+    : recording_(std::move(recording)),
+      info_(recording_->info()),
+      speed_(speed),
+      passes_left_(passes),
+      clock_(std::move(clock)) {
+  if (!(speed > 0) || passes < 1) throw std::invalid_argument("ReplayStream: speed and passes must be positive");
+  info_.path = "replay:" + info_.path;
+}
+
+ReplayClock::Time ReplayStream::due(Stamp stamp) const {
+  return *start_ + scaled(seconds_between(*first_stamp_, stamp), speed_);
+}
+
+Result<StreamRead> ReplayStream::read(nanoseconds timeout) {
+  const ReplayClock::Time called = clock_.now();
+  if (!next_ && !ended_) {
+    if (Status fetched = fetch(); !fetched) return failure(fetched);
+  }
+  if (!next_) return StreamRead{StreamRead::State::end, {}, clock_.now()};
+  const Stamp stamp = stamp_of(*next_);
+  if (!start_) {
+    start_ = clock_.now();
+    first_stamp_ = stamp;
+  }
+  const ReplayClock::Time when = due(stamp), now = clock_.now();
+  if (when > now && when > called + timeout) {
+    clock_.wait_until(called + timeout);
+    return StreamRead{StreamRead::State::none_yet, {}, clock_.now()};
+  }
+  if (when > now) clock_.wait_until(when);
+  return StreamRead{StreamRead::State::sample, std::exchange(next_, std::nullopt), std::max(when, now)};
+}
+
+Status ReplayStream::fetch() {
+  auto sample = recording_->next();
+  if (!sample) return failure(sample);
+  if (!*sample && passes_left_ > 1 && first_stamp_) {
+    --passes_left_;
+    if (Status again = recording_->seek(0); !again) return again;
+    const double step_s = recording_->info().sequence.median_step_s;
+    const Stamp begin{last_.stamp.ns + Stamp::from_seconds(step_s > 0 ? step_s : kPause_s).ns};
+    sample = recording_->next();
+    if (!sample) return failure(sample);
+    offset_ = last_;
+    offset_.stamp = Stamp{begin.ns - first_stamp_->ns};
+    offset_.frame_id = last_.frame_id + 1;
+    offset_.position_id = last_.position_id + 1;
+  }
+  if (!*sample) {
+    ended_ = true;
+    return {};
+  }
+  shift(**sample);
+  note(**sample);
+  next_ = std::move(**sample);
+  return {};
+}
+
+void ReplayStream::shift(Sample& sample) const {
+  const auto move_frame = [&](StereoFrame& frame) {
+    frame.left_stamp.ns += offset_.stamp.ns;
+    frame.right_stamp.ns += offset_.stamp.ns;
+    frame.frame_id += offset_.frame_id;
+    if (frame.position_id >= 0) frame.position_id += offset_.position_id;
+  };
+  if (auto* frame = std::get_if<StereoFrame>(&sample)) move_frame(*frame);
+  if (auto* missing = std::get_if<MissingFrame>(&sample)) {
+    missing->stamp.ns += offset_.stamp.ns;
+    missing->frame_id += offset_.frame_id;
+    if (missing->partial) move_frame(*missing->partial);
+  }
+  if (auto* imu = std::get_if<ImuSample>(&sample)) imu->stamp.ns += offset_.stamp.ns;
+  if (auto* wheels = std::get_if<WheelSample>(&sample)) {
+    wheels->stamp.ns += offset_.stamp.ns;
+    wheels->left_m += offset_.left_m;
+    wheels->right_m += offset_.right_m;
+  }
+  if (auto* compass = std::get_if<CompassSample>(&sample)) compass->stamp.ns += offset_.stamp.ns;
+  if (auto* inclinometer = std::get_if<InclinometerSample>(&sample)) inclinometer->stamp.ns += offset_.stamp.ns;
+}
+
+void ReplayStream::note(const Sample& sample) {
+  last_.stamp = std::max(last_.stamp, stamp_of(sample));
+  if (const auto* frame = std::get_if<StereoFrame>(&sample)) {
+    last_.frame_id = std::max(last_.frame_id, frame->frame_id);
+    last_.position_id = std::max(last_.position_id, frame->position_id);
+  }
+  if (const auto* missing = std::get_if<MissingFrame>(&sample))
+    last_.frame_id = std::max(last_.frame_id, missing->frame_id);
+  if (const auto* wheels = std::get_if<WheelSample>(&sample)) {
+    last_.left_m = wheels->left_m;
+    last_.right_m = wheels->right_m;
+  }
+}
+
+}  // namespace spartan::internal

@@ -1,0 +1,86 @@
+// SampleStream: stereo frames and sensor samples in order of arrival, from a recording or from sensors that run now.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "spartan/camera/samples.h"
+#include "spartan/core/result.h"
+#include "spartan/rig/rig.h"
+
+namespace spartan {
+
+struct OpenOptions;
+
+/// What a stream states about the rover that its samples come from.
+struct StreamInfo {
+  std::string path;  ///< folder of a recording; address of a live stream
+  Rig rig;
+  std::string rig_source;              ///< the file that the rig was read from
+  std::string name;                    ///< from recording.yaml, else the folder's name
+  std::string description;             ///< from recording.yaml, else empty
+  std::optional<double> gravity_m_s2;  ///< from recording.yaml
+  SensorNoise noise;                   ///< specified noise, from recording.yaml or imu0/sensor.yaml
+  bool has_imu = false;
+};
+
+/// Sensor samples (not frames) that a stream has discarded so far.
+struct DiscardedSamples {
+  std::int64_t reversed = 0;     ///< their stamps do not increase within their sensor
+  std::int64_t unreadable = 0;   ///< they cannot be parsed
+  std::string first_unreadable;  ///< place and fault of the first one
+};
+
+/// Outcome of SampleStream::read().
+struct StreamRead {
+  enum class State {
+    sample,
+    none_yet,  ///< no sample arrived before the timeout
+    end,       ///< no sample will follow
+  };
+  State state = State::end;
+  std::optional<Sample> sample;                   ///< with State::sample
+  std::chrono::steady_clock::time_point arrived;  ///< when the host had the sample complete
+};
+
+/// Samples in order of arrival. A recording yields them ordered by stamp; from a live stream they arrive late and out
+/// of order between sensors, in order within each.
+class SampleStream {
+ public:
+  virtual ~SampleStream() = default;
+
+  virtual const StreamInfo& info() const = 0;
+
+  /// The next sample, waiting for it at most `timeout`. A frame that cannot be delivered comes as MissingFrame. Codes:
+  /// `read_error` and `resources` where the system cannot read now; of other errors the stream does not recover.
+  virtual Result<StreamRead> read(std::chrono::nanoseconds timeout) = 0;
+
+  virtual DiscardedSamples discarded() const { return {}; }
+
+  /// Number of frames of a pair that can be had before the first call of read(), for what is chosen by images: all
+  /// listed ones of a recording, those that a camera takes for this purpose.
+  virtual std::size_t previews(const std::string& pair) const = 0;
+  /// One of them, in order of time. Does not change what read() returns. Code `input`: this one is not usable.
+  virtual Result<StereoFrame> preview(const std::string& pair, std::size_t index) = 0;
+};
+
+/// How to open a live stream.
+struct LiveOptions {
+  double speed = 1;  ///< of a stream that is not real: seconds of its stamps in a second
+  int passes = 1;    ///< how often a recording is played
+};
+
+/// Whether an input is the address of a live stream ("replay:FOLDER") and not the folder of a recording.
+bool is_live_address(std::string_view input);
+
+/// Opens a live stream: `replay:FOLDER`, a recording whose samples arrive at the pace of their stamps. Codes: `usage`
+/// (no such kind of stream, speed or passes not positive), and those of open_recording().
+Result<std::unique_ptr<SampleStream>> open_live_stream(const std::string& address, const OpenOptions& open,
+                                                       const LiveOptions& options);
+
+}  // namespace spartan

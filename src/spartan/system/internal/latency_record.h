@@ -1,0 +1,22 @@
+// Latencies of a live run: from the arrival of an image to the pose at it.
+#pragma once
+
+#include <chrono>
+#include <vector>
+
+namespace spartan::internal {
+
+/// One value for each frame of the odometry pair, ms.
+struct LatencyRecord {
+  std::vector<float> all_ms;
+  std::vector<float> at_stops_ms;  ///< those of frames at a stop
+
+  using Time = std::chrono::steady_clock::time_point;
+  void add(Time arrived, Time answered, bool at_stop) {
+    const float ms = std::chrono::duration<float, std::milli>(answered - arrived).count();
+    all_ms.push_back(ms);
+    if (at_stop) at_stops_ms.push_back(ms);
+  }
+};
+
+}  // namespace spartan::internal

@@ -1,0 +1,103 @@
+#include "spartan/system/internal/sample_queue.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+#include <variant>
+
+namespace spartan::internal {
+namespace {
+
+std::size_t bytes_of(const StereoFrame& frame) {
+  return frame.left.bytes() + frame.right.bytes();
+}
+
+std::size_t bytes_of(const Sample& sample) {
+  if (const auto* frame = std::get_if<StereoFrame>(&sample)) return bytes_of(*frame);
+  const auto* missing = std::get_if<MissingFrame>(&sample);
+  return missing != nullptr && missing->partial ? bytes_of(*missing->partial) : 0;
+}
+
+bool is_frame(const Sample& sample) {
+  return std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);
+}
+
+}  // namespace
+
+void SampleQueue::push(StreamRead read) {
+  {
+    const std::lock_guard lock(mutex_);
+    bytes_ += bytes_of(*read.sample);
+    if (!is_frame(*read.sample)) ++sensor_samples_;
+    reads_.push_back(std::move(read));
+    make_room();
+    peak_bytes_ = std::max(peak_bytes_, bytes_);
+  }
+  arrived_.notify_one();
+}
+
+void SampleQueue::make_room() {
+  while (bytes_ > most_bytes_ && (drop_oldest(true) || drop_oldest(false))) {
+  }
+  if (sensor_samples_ <= kMostSensorSamples) return;
+  const auto oldest =
+      std::find_if(reads_.begin(), reads_.end(), [](const StreamRead& read) { return !is_frame(*read.sample); });
+  reads_.erase(oldest);
+  --sensor_samples_;
+  ++dropped_.sensor_samples;
+}
+
+// Whether there was one. Its place in the order stays.
+bool SampleQueue::drop_oldest(bool view) {
+  for (StreamRead& read : reads_) {
+    const auto* frame = std::get_if<StereoFrame>(&*read.sample);
+    if (frame == nullptr || (frame->pair != odometry_pair_) != view) continue;
+    bytes_ -= bytes_of(*frame);
+    MissingFrame missing{frame->frame_id,
+                         frame->pair,
+                         frame->left_stamp,
+                         FrameFault::dropped,
+                         fmt::format("dropped: {} MB of images waited to be processed", most_bytes_ >> 20U),
+                         {}};
+    read.sample = std::move(missing);
+    ++(view ? dropped_.views : dropped_.odometry);
+    return true;
+  }
+  return false;
+}
+
+void SampleQueue::close(Status reason) {
+  {
+    const std::lock_guard lock(mutex_);
+    closed_ = true;
+    reason_ = std::move(reason);
+  }
+  arrived_.notify_one();
+}
+
+Result<StreamRead> SampleQueue::pop(std::chrono::nanoseconds timeout) {
+  std::unique_lock lock(mutex_);
+  arrived_.wait_for(lock, timeout, [this] { return !reads_.empty() || closed_; });
+  const auto now = std::chrono::steady_clock::now();
+  if (reads_.empty() && !closed_) return StreamRead{StreamRead::State::none_yet, {}, now};
+  if (reads_.empty() && !reason_) return failure(reason_);
+  if (reads_.empty()) return StreamRead{StreamRead::State::end, {}, now};
+  StreamRead read = std::move(reads_.front());
+  reads_.pop_front();
+  bytes_ -= bytes_of(*read.sample);
+  if (!is_frame(*read.sample)) --sensor_samples_;
+  return read;
+}
+
+DroppedFrames SampleQueue::dropped() const {
+  const std::lock_guard lock(mutex_);
+  return dropped_;
+}
+
+std::size_t SampleQueue::peak_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return peak_bytes_;
+}
+
+}  // namespace spartan::internal
