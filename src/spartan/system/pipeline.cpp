@@ -126,9 +126,29 @@ void Pipeline::State::localize(const RelativeMotion& motion) {
   slam_filter.add(motion);
 }
 
-bool Pipeline::State::terrain_is_due() const {
-  if (!computes_terrain) return false;
-  return distance_of_last_terrain_m < 0 || distance_m - distance_of_last_terrain_m >= options.terrain.every_m;
+TerrainView Pipeline::State::take_terrain() {
+  back_end.wait(terrain_stage.ticket());
+  return terrain_stage.take(clock);
+}
+
+// The pending view, if it is to be delivered with this frame; live, only if the back end has made it.
+std::optional<TerrainView> Pipeline::State::take_ready_terrain() {
+  if (!terrain_stage.is_pending()) return std::nullopt;
+  const bool next_is_due = pace == Pace::recorded && terrain_stage.is_due(distance_m);
+  if ((!terrain_stage.is_ready() && !next_is_due) || !is_made(terrain_stage.ticket())) return std::nullopt;
+  return take_terrain();
+}
+
+// `dense`: of the odometry, or empty. Live, a view that is due while the back end makes another one waits for a later
+// frame.
+void Pipeline::State::update_terrain(const RectifiedPair& rectified, const DisparityImage& dense) {
+  if (!computes_terrain || terrain_stage.is_pending() || !terrain_stage.is_due(distance_m)) return;
+  if (!has_both_images(rectified)) return;
+  if (dense.disparity.empty()) {
+    terrain_stage.begin(rectified, world_from_left, distance_m, pair.nearest_m, disparity_computer, back_end);
+  } else {
+    terrain_stage.begin(rectified, world_from_left, distance_m, dense);
+  }
 }
 
 // Whether the disparities of this frame can be computed, if terrain or the map of a stop needs them.
@@ -137,8 +157,9 @@ Status Pipeline::State::check_disparities(const RectifiedPair& rectified) const 
   return StopMapper::check(rectified, pair.nearest_m);
 }
 
-// The returned views are valid until the next call.
-Result<DisparityImage> Pipeline::State::dense_disparity(const RectifiedPair& rectified) {
+// Empty if the odometry computes the disparities of its landmarks itself. Valid until the next call.
+Result<DisparityImage> Pipeline::State::disparity_for_odometry(const RectifiedPair& rectified) {
+  if (!odometry_is_dense() || !has_both_images(rectified)) return DisparityImage();
   return clock.measure("reconstruction", [&] {
     return disparity_computer.compute(rectified.left, rectified.right,
                                       disparity_range(rectified.geometry, pair.nearest_m), rectified.left_mask,
@@ -146,15 +167,8 @@ Result<DisparityImage> Pipeline::State::dense_disparity(const RectifiedPair& rec
   });
 }
 
-// Empty if the odometry computes the disparities of its landmarks itself.
-Result<DisparityImage> Pipeline::State::disparity_for_odometry(const RectifiedPair& rectified) {
-  if (options.odometry.reconstruction.source != DisparitySource::dense || !has_both_images(rectified))
-    return DisparityImage();
-  return dense_disparity(rectified);
-}
-
 Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, ThreadPool workers,
-                                  const std::string& mask_folder) {
+                                  const std::string& mask_folder, Pace pace) {
   if (Status status = validate(options, "options"); !status) return failure(status);
   const StereoPair* const pair = odometry_pair_of(rig, options);
   if (pair == nullptr) {
@@ -168,7 +182,7 @@ Result<Pipeline> Pipeline::create(const Rig& rig, const RunOptions& options, Thr
   if (!imager) return failure(imager);
   const RunOptions resolved = resolved_options(options, rig);
   if (Status status = validate(resolved, "options with the values of the rig"); !status) return failure(status);
-  return Pipeline(std::make_unique<State>(rig, resolved, std::move(*imager), *pair, workers));
+  return Pipeline(std::make_unique<State>(rig, resolved, std::move(*imager), *pair, workers, pace));
 }
 
 Pipeline::Pipeline(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -178,7 +192,7 @@ Pipeline::~Pipeline() = default;
 
 Status Pipeline::check_memory(std::int64_t most_bytes) const {
   const State& s = *state_;
-  const bool odometry_needs = s.computes_terrain || s.options.odometry.reconstruction.source == DisparitySource::dense;
+  const bool odometry_needs = s.computes_terrain || s.odometry_is_dense();
   for (const StereoPair& pair : s.rig.pairs) {
     if (!s.maps_stops && !((odometry_needs || s.maps_keyframes) && pair.name == s.pair.name)) continue;
     const RectifiedStereo geometry = s.imager.geometry(pair.name);
@@ -231,22 +245,16 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   auto disparity = s.disparity_for_odometry(*rectified);
   if (!disparity) return failure(disparity);
 
-  // All steps that can fail come first, here and in finish_stop(); the stages advance only after them.
+  // All steps that can fail come first; the stages advance only after them.
   if (Status valid = s.check_disparities(*rectified); !valid) return failure(valid);
+  if (Status started = s.start_maps(); !started) return failure(started);
   FrameResult result;
   // Before the stages advance: the map constraint applies to the pose at the stop.
-  if (s.maps_stops && frame.position_id != s.stop_stage.position_id()) {
-    auto stop = s.finish_stop();
-    if (!stop) return failure(stop);
-    result.stop = std::move(*stop);
-  }
-  if (s.keyframe_stage.is_ready()) {
-    auto map = s.finish_keyframe();
-    if (!map) return failure(map);
-    result.stop = std::move(*map);
-  } else if (Status status = s.start_keyframe_map(); !status) {
-    return failure(status);
-  }
+  const bool leaves_stop = s.maps_stops && frame.position_id != s.stop_stage.position_id();
+  auto map = s.apply_due_map(leaves_stop);
+  if (!map) return failure(map);
+  result.stop = std::move(*map);
+  if (leaves_stop) s.stop_stage.depart(s.back_end);
   s.frozen_cameras.remember(pair_index, images);
   const std::optional<Pose> predicted = s.predicted_motion(*rectified), by_sensors = s.motion_by_sensors(*rectified);
   if (!s.started) s.start(*rectified);
@@ -282,12 +290,10 @@ Result<std::optional<FrameResult>> Pipeline::add(const StereoFrame& frame) {
   if (Status status = s.add_odometry_frame(frame, *rectified, body_motion); !status) return failure(status);
   s.update_keyframes(*rectified, result.motion, body_motion);
 
-  if (s.terrain_is_due() && has_both_images(*rectified)) {
-    if (disparity->disparity.empty()) disparity = s.dense_disparity(*rectified);
-    if (!disparity) return failure(disparity);
-    s.distance_of_last_terrain_m = s.distance_m;
-    result.terrain = TerrainView{*rectified, disparity->disparity, disparity->sigma, s.world_from_left};
-  }
+  s.terrain_stage.advance();
+  result.terrain = s.take_ready_terrain();
+  s.update_terrain(*rectified, *disparity);
+  if (s.options.terrain.delay_frames == 0 && !result.terrain) result.terrain = s.take_ready_terrain();
   result.times = s.clock.take();
   return result;
 }
@@ -296,6 +302,7 @@ FrameFault Pipeline::fault_of(const StereoFrame& frame) const {
   const State& s = *state_;
   const StereoPair* const pair = s.rig.find_pair(frame.pair);
   if (pair == nullptr) return FrameFault::wrong_size;
+  if (s.view_was_dropped && pair->name != s.pair.name) return FrameFault::dropped;
   const bool frozen = s.frozen_cameras.find(s.index_of(*pair), FrozenCameras::fingerprints_of(frame)).has_value();
   return frozen ? FrameFault::frozen : FrameFault::wrong_size;
 }
@@ -312,6 +319,11 @@ Result<std::optional<MappedStop>> Pipeline::finish_stop() {
   auto map = state_->finish_keyframe();
   if (!map) return failure(map);
   return std::move(*map);
+}
+
+std::optional<TerrainView> Pipeline::finish_terrain() {
+  if (!state_->terrain_stage.is_pending()) return std::nullopt;
+  return state_->take_terrain();
 }
 
 std::vector<StageTime> Pipeline::take_stage_times() {

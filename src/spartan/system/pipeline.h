@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/recording.h"
 #include "spartan/camera/samples.h"
 #include "spartan/core/archive.h"
+#include "spartan/core/image.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/result.h"
 #include "spartan/core/stage_clock.h"
@@ -23,15 +23,24 @@
 
 namespace spartan {
 
-/// Dense disparity of one frame with its pose. The views borrow the pipeline's buffers until the next frame.
+/// Dense disparity of one frame with its pose.
 struct TerrainView {
-  RectifiedPair pair;
-  ImageView<const float> disparity;  ///< px, NaN unknown
-  ImageView<const float> sigma;      ///< standard deviation of the disparity, px
-  Pose world_from_left;              ///< rectified left optical frame
+  std::string pair;
+  Stamp stamp;
+  RectifiedStereo geometry;
+  Image<std::uint8_t> left;  ///< rectified
+  Image<float> disparity;    ///< px, NaN unknown
+  Image<float> sigma;        ///< standard deviation of the disparity, px
+  Pose world_from_left;      ///< rectified left optical frame
 };
 
-/// Result of mapping a stop, computed when the rover leaves it, or of mapping a keyframe, computed some frames later.
+/// Whether frames wait for the back end, which makes terrain views and maps.
+enum class Pace {
+  recorded,  ///< what it makes enters at a stated frame, which waits for it: results do not depend on time
+  live,      ///< no frame waits: what it makes enters at that frame or at the first one at which it is ready
+};
+
+/// Result of mapping a stop that the rover has left, or a keyframe, some frames later.
 struct MappedStop {
   std::int64_t position_id = -1;  ///< -1: a keyframe
   Stamp stamp;                    ///< of the odometry pair's first frame at the stop, or of the keyframe
@@ -50,19 +59,20 @@ struct FrameResult {
   MotionEstimate motion;                             ///< its covariance includes the errors of the calibration
   std::optional<UncertainPose> slam;                 ///< world_from_body: odometry corrected by map matching
   std::optional<LocalizationEstimate> localization;  ///< by all sensors
-  std::optional<TerrainView> terrain;                ///< if due, see TerrainOptions::every_m
-  std::optional<MappedStop> stop;  ///< the stop that ended with this frame, or an earlier keyframe, if it was mapped
+  std::optional<TerrainView> terrain;                ///< of an earlier frame, see TerrainOptions
+  std::optional<MappedStop> stop;                    ///< an earlier stop or keyframe whose map was applied now
   std::vector<StageTime> times;
 };
 
-/// Computes poses, terrain and maps from pushed samples. `spartan run` feeds it from a recording; a live camera or a
-/// ROS node can push samples from memory that it owns. Not thread-safe; one pipeline per rover.
+/// Computes poses, terrain and maps from pushed samples. `spartan run` feeds it from a recording or a live stream; a
+/// ROS node can push samples from memory that it owns. A front end (imaging, odometry, localization) answers within
+/// add(); a back end makes terrain views and maps beside it. Not thread-safe; one pipeline per rover.
 class Pipeline {
  public:
   /// Self-masks are read from `mask_folder` (the folder of the rig file). Code `configuration`: rig or options are
   /// invalid; the error names every option that is out of bounds.
   static Result<Pipeline> create(const Rig& rig, const RunOptions& options, ThreadPool workers,
-                                 const std::string& mask_folder = {});
+                                 const std::string& mask_folder = {}, Pace pace = Pace::recorded);
   Pipeline(Pipeline&&) noexcept;
   Pipeline& operator=(Pipeline&&) noexcept;
   ~Pipeline();
@@ -82,14 +92,15 @@ class Pipeline {
 
   /// Processes one stereo frame. Only frames of the odometry pair have a result, and only of them one image may be
   /// missing: the landmarks are then measured in the other one. Frames of other pairs are views of the
-  /// stop whose position_id they carry; the stop is mapped when the odometry pair reports another position_id. After an
-  /// error the state is as before the call: the next frame, or the same frame again, may be added.
+  /// stop whose position_id they carry; the back end maps the stop when the odometry pair reports another position_id.
+  /// After an error the state is as before the call: the next frame, or the same frame again, may be added.
   /// Codes: `frame_rejected` (the images do not fit the rig, the rig has no such pair, or an image equals the previous
   /// one of its camera bit for bit, which the noise of a sensor excludes; images with one value in all pixels are
-  /// exempt), `store_damaged` (a map tile cannot be read).
+  /// exempt; at Pace::live, a view of a stop while as many as `kMostViews` wait for the back end), `store_damaged` (a
+  /// map tile cannot be read).
   Result<std::optional<FrameResult>> add(const StereoFrame& frame);
 
-  /// Why add() has just rejected the frame with the code `frame_rejected`: `frozen` or `wrong_size`.
+  /// Why add() has just rejected the frame with the code `frame_rejected`: `frozen`, `dropped` or `wrong_size`.
   FrameFault fault_of(const StereoFrame& frame) const;
 
   /// From now on tiles of the global map may be paged out to `store`, which must contain this pipeline's map or be
@@ -98,9 +109,11 @@ class Pipeline {
   Status flush_maps();
   GlobalMap& global_map();
 
-  /// Maps the current stop if it has views, or the pending keyframe; for the end of a drive. After an error the stop
-  /// stays the current one.
+  /// For the end of a drive: waits for the map of a stop, the current one included, or of a keyframe, and applies it.
+  /// To be called until there is none. After an error the call may be repeated.
   Result<std::optional<MappedStop>> finish_stop();
+  /// Waits for the terrain view that is to be delivered with a later frame, if there is one.
+  std::optional<TerrainView> finish_terrain();
 
   /// Times of the stages since the last result: views of a stop and its mapping.
   std::vector<StageTime> take_stage_times();
@@ -108,8 +121,8 @@ class Pipeline {
   /// is smoothed.
   Bytes take_localization_inputs();
 
-  /// After restore(): frames of the current stop whose images must be passed to restore_frame() again, in this order,
-  /// before the next frame is added.
+  /// After restore(): frames that the back end was to work on, whose images must be passed to restore_frame() again, in
+  /// this order, before the next frame is added.
   std::vector<FrameKey> pending_frames() const;
   Status restore_frame(const StereoFrame& frame);
 
@@ -133,6 +146,9 @@ class Pipeline {
   Status restore(const Bytes& state, TileStore& maps);
 
  private:
+  /// Views of stops that may wait for the back end at Pace::live.
+  static constexpr int kMostViews = 12;
+
   struct State;
   explicit Pipeline(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;

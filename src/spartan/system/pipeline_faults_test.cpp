@@ -37,6 +37,7 @@ TEST(PipelineFaults, AMissingImageCostsLittle) {
     RunOptions options;
     options.keyframes.every_m = 0.04;
     options.terrain.every_m = 0.01;
+    options.terrain.delay_frames = 0;
     Pipeline pipeline = pipeline_of(options);
     for (int i = 0; i < 5; ++i) {
       StereoFrame frame = frame_at(i);

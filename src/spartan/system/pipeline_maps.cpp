@@ -1,4 +1,6 @@
 // Local maps of stops and keyframes, and their constraints on the pose.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <memory>
 #include <optional>
@@ -34,74 +36,127 @@ Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const Recti
   const bool begins = frame.position_id != stop_stage.position_id();
   if (begins && !has_both_images(rectified)) return {};
   return stop_stage.add_odometry_frame(frame.position_id, rectified, pair.nearest_m,
-                                       localized_at(rectified.stamp).world_from_body, motion);
+                                       localized_at(rectified.stamp).world_from_body, motion, back_end);
 }
 
 // Adds a frame of another pair to the stop that it belongs to.
 Status Pipeline::State::add_view(const StereoFrame& frame) {
   if (!maps_stops || frame.position_id < 0) return {};
   const StereoPair& of = *rig.find_pair(frame.pair);
+  view_was_dropped = pace == Pace::live && back_end.backlog() >= kMostViews;
+  if (view_was_dropped) {
+    return failure(ErrorCode::frame_rejected, "dropped: the back end has not computed the views before",
+                   fmt::format("frame {} of pair '{}'", frame.frame_id, frame.pair));
+  }
   const auto images = FrozenCameras::fingerprints_of(frame);
   if (Status status = check_new(frame, index_of(of), images); !status) return status;
   const auto rectified = clock.measure("imaging", [&] { return imager.process(frame); });
   if (!rectified) return failure(rectified);
   clock.add(rectified->times);
-  Status added = clock.measure(
-      "reconstruction", [&] { return stop_stage.add_view(frame.position_id, frame.pair, *rectified, of.nearest_m); });
+  Status added = stop_stage.add_view(frame.position_id, frame.pair, *rectified, of.nearest_m, back_end);
   if (added) frozen_cameras.remember(index_of(of), images);
   return added;
 }
 
-Result<std::optional<MappedStop>> Pipeline::State::finish_stop() {
-  if (stop_stage.mapper().views().empty()) {
-    stop_stage.clear();
-    return std::nullopt;
-  }
-  const auto survey = clock.measure("mapping", [&] { return stop_stage.survey(); });
-  auto merged =
-      clock.measure("slam", [&] { return merger.add(survey->points, survey->stamp, survey->world_from_body); });
-  if (!merged) return failure(merged);  // the stop stays the current one
-  stop_stage.clear();
-  return apply(*survey, std::move(*merged));
+// The global map does not change while a match is made, so the part of it that the map will be matched to is taken
+// before, by the thread that may read the store.
+Status Pipeline::State::start_maps() {
+  if (Status status = start_stop_match(); !status) return status;
+  return keyframe_stage.is_ready() ? Status() : start_keyframe_map();
 }
 
-// The global map does not change while a keyframe is pending, so the part of it that the map will be matched to is
-// taken now, by the thread that may read the store.
-Status Pipeline::State::start_keyframe_map() {
-  if (!keyframe_stage.is_pending() || !keyframe_task.empty()) return {};
-  keyframe_map.clock.take();
-  auto global = keyframe_map.clock.measure("slam", [&] { return merger.excerpt_around(keyframe_stage.prior().pose); });
+Status Pipeline::State::start_stop_match() {
+  if (!stop_stage.is_unmatched()) return {};
+  StageClock times(CLOCK_THREAD_CPUTIME_ID);
+  auto global = times.measure("slam", [&] { return merger.excerpt_around(stop_stage.prior()); });
   if (!global) return failure(global);
-  keyframe_task =
-      workers.start([this, excerpt = std::make_shared<const std::optional<MapExcerpt>>(std::move(*global))] {
-        make_keyframe_map(*excerpt);
+  stop_stage.start_match(merger, std::move(*global), std::move(times), back_end);
+  return {};
+}
+
+// A stop that the rover leaves cannot be matched before the map of the stop before it is applied.
+Result<std::optional<MappedStop>> Pipeline::State::apply_due_map(bool leaves_stop) {
+  std::optional<MappedStop> applied;
+  if (leaves_stop && options.stop_delay_frames == 0 && pace == Pace::recorded) return map_at_departure();
+  if (stop_stage.is_due(leaves_stop && stop_stage.has_views() && pace == Pace::recorded) &&
+      is_made(stop_stage.ticket())) {
+    auto stop = finish_departed_stop();
+    if (!stop) return failure(stop);
+    applied = std::move(*stop);
+  } else if (keyframe_stage.is_ready() && (!keyframe_map || is_made(keyframe_map->ticket))) {
+    auto map = finish_keyframe();
+    if (!map) return failure(map);
+    applied = std::move(*map);
+  }
+  return applied;
+}
+
+// Without a delay.
+Result<std::optional<MappedStop>> Pipeline::State::map_at_departure() {
+  if (!stop_stage.has_views()) return std::nullopt;
+  StageClock times(CLOCK_THREAD_CPUTIME_ID);
+  auto global = times.measure("slam", [&] { return merger.excerpt_around(stop_stage.prior()); });
+  if (!global) return failure(global);
+  stop_stage.depart(back_end);
+  stop_stage.start_match(merger, std::move(*global), std::move(times), back_end);
+  auto stop = finish_departed_stop();
+  if (stop) return std::move(*stop);
+  stop_stage.undo_departure();
+  return failure(stop);
+}
+
+Result<MappedStop> Pipeline::State::finish_departed_stop() {
+  back_end.wait(stop_stage.ticket());
+  StageClock times(CLOCK_THREAD_CPUTIME_ID);
+  Status fused = times.measure("slam", [&] { return merger.fuse(stop_stage.matched()); });
+  if (!fused) return failure(fused);  // the stop stays the oldest one
+  const StopSurvey survey = stop_stage.survey();
+  StopStage::Mapped mapped = stop_stage.take_oldest();
+  clock.add(mapped.times);
+  clock.add(times.take());
+  return apply(survey, std::move(mapped.matched));
+}
+
+Result<std::optional<MappedStop>> Pipeline::State::finish_stop() {
+  stop_stage.depart(back_end);
+  if (!stop_stage.has_departed()) return std::nullopt;
+  if (Status status = start_stop_match(); !status) return failure(status);
+  auto stop = finish_departed_stop();
+  if (!stop) return failure(stop);
+  return std::move(*stop);
+}
+
+Status Pipeline::State::start_keyframe_map() {
+  if (!keyframe_stage.is_pending() || keyframe_map) return {};
+  auto map = std::make_shared<KeyframeMap>();
+  auto global = map->clock.measure("slam", [&] { return merger.excerpt_around(keyframe_stage.prior().pose); });
+  if (!global) return failure(global);
+  keyframe_map = map;
+  map->ticket =
+      back_end.submit([this, map, excerpt = std::make_shared<const std::optional<MapExcerpt>>(std::move(*global))] {
+        const auto points = map->clock.measure("mapping", [&] { return keyframe_stage.points(pair.nearest_m); });
+        if (!points) {
+          map->matched = failure(points);
+          return;
+        }
+        map->matched = map->clock.measure("slam", [&] {
+          return merger.match(*points, keyframe_stage.stamp(), keyframe_stage.prior(), *excerpt, ThreadPool(1));
+        });
       });
   return {};
 }
 
-void Pipeline::State::make_keyframe_map(const std::optional<MapExcerpt>& global) {
-  StageClock& times = keyframe_map.clock;
-  const auto points = times.measure("mapping", [&] { return keyframe_stage.points(pair.nearest_m); });
-  if (!points) {
-    keyframe_map.matched = failure(points);
-    return;
-  }
-  keyframe_map.matched = times.measure("slam", [&] {
-    return merger.match(*points, keyframe_stage.stamp(), keyframe_stage.prior(), global, ThreadPool(1));
-  });
-}
-
 Result<MappedStop> Pipeline::State::finish_keyframe() {
   if (Status status = start_keyframe_map(); !status) return failure(status);
-  keyframe_task.wait();
-  if (!keyframe_map.matched) return failure(keyframe_map.matched);
-  Status fused = keyframe_map.clock.measure("slam", [&] { return merger.fuse(*keyframe_map.matched); });
+  back_end.wait(keyframe_map->ticket);
+  if (!keyframe_map->matched) return failure(keyframe_map->matched);
+  Status fused = keyframe_map->clock.measure("slam", [&] { return merger.fuse(*keyframe_map->matched); });
   if (!fused) return failure(fused);  // the keyframe stays pending
-  clock.add(sums_by_stage(keyframe_map.clock.take()));
+  const std::shared_ptr<KeyframeMap> map = std::exchange(keyframe_map, nullptr);
+  clock.add(sums_by_stage(map->clock.take()));
   const StopSurvey survey = keyframe_stage.survey();
-  keyframe_task = {};
   keyframe_stage.clear();
-  return apply(survey, std::move(*keyframe_map.matched));
+  return apply(survey, std::move(*map->matched));
 }
 
 MappedStop Pipeline::State::apply(const StopSurvey& survey, MapMergeResult merged) {

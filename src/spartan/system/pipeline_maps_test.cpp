@@ -21,6 +21,14 @@ using testing::images_of;
 using testing::mapping_rover;
 using testing::pose_at;
 
+// Maps are applied with the frame at which the rover leaves the stop.
+RunOptions without_delay() {
+  RunOptions options;
+  options.stop_delay_frames = 0;
+  options.terrain.delay_frames = 0;
+  return options;
+}
+
 FrameResult drive_to(Pipeline& pipeline, int index) {
   return pipeline.add(frame_of(images_of("narrow", index), "narrow", index, 3.0 * index)).value().value();
 }
@@ -30,7 +38,7 @@ void add_wide_view(Pipeline& pipeline, int index, double after_s = 1) {
 }
 
 TEST(PipelineMaps, StopsAreMappedAndMatchedToEachOther) {
-  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value();
   EXPECT_FALSE(drive_to(pipeline, 0).stop);
   add_wide_view(pipeline, 0);
   const FrameResult next = drive_to(pipeline, 1);
@@ -51,7 +59,7 @@ TEST(PipelineMaps, StopsAreMappedAndMatchedToEachOther) {
 }
 
 TEST(PipelineMaps, MapConstraintUpdatesTheLocalization) {
-  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value();
   FrameResult result = drive_to(pipeline, 0);
   add_wide_view(pipeline, 0);
   for (int i = 1; i < kFrames; ++i) result = drive_to(pipeline, i);
@@ -74,7 +82,7 @@ TEST(PipelineMaps, MotionsHoldTheErrorsOfTheCalibration) {
   uncertain.calibration_errors = CalibrationErrors{0, 1, 2, 3, 0};
   std::vector<FrameResult> results;
   for (const Rig& rig : {mapping_rover(), uncertain}) {
-    Pipeline pipeline = Pipeline::create(rig, {}, ThreadPool(2)).value();
+    Pipeline pipeline = Pipeline::create(rig, without_delay(), ThreadPool(2)).value();
     drive_to(pipeline, 0);
     results.push_back(drive_to(pipeline, 1));
   }
@@ -93,7 +101,7 @@ TEST(PipelineMaps, MotionsHoldTheErrorsOfTheCalibration) {
 TEST(PipelineMaps, ConstraintIsAppliedAfterLongStopWithOdometryFrames) {
   for (const double buffer_s : {0.5, 300.0}) {
     SCOPED_TRACE(buffer_s);
-    RunOptions options;
+    RunOptions options = without_delay();
     options.localization.buffer_s = buffer_s;
     Pipeline pipeline = Pipeline::create(mapping_rover(), options, ThreadPool(2)).value();
     FrameResult result = drive_to(pipeline, 0);
@@ -125,7 +133,7 @@ TEST(PipelineMaps, ConstraintIsAppliedAfterLongStopWithOdometryFrames) {
 }
 
 TEST(PipelineMaps, ViewsMayComeBeforeTheOdometryFrame) {
-  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value();
   add_wide_view(pipeline, 0, -1);
   add_wide_view(pipeline, 0, -0.5);
   EXPECT_FALSE(drive_to(pipeline, 0).stop);
@@ -142,8 +150,8 @@ TEST(PipelineMaps, ViewsMayComeBeforeTheOdometryFrame) {
 
 // Saved at a narrow frame between two wide views.
 TEST(PipelineMaps, StopContinuesFromRestoredState) {
-  Pipeline uninterrupted = Pipeline::create(mapping_rover(), {}, ThreadPool(1)).value(),
-           resumed = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
+  Pipeline uninterrupted = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(1)).value(),
+           resumed = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value();
   drive_to(uninterrupted, 0);
   add_wide_view(uninterrupted, 0);
   ASSERT_TRUE(uninterrupted.add(frame_of(images_of("narrow", 0), "narrow", 0, 1.5)).value().has_value());
@@ -195,8 +203,8 @@ void expect_same_map(const LocalMap& a, const LocalMap& b) {
 
 // More views than an eight-bit mask can distinguish, saved and restored between the ninth and the tenth.
 TEST(PipelineMaps, StopMayHaveAnyNumberOfViews) {
-  Pipeline uninterrupted = Pipeline::create(mapping_rover(), {}, ThreadPool(1)).value(),
-           resumed = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
+  Pipeline uninterrupted = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(1)).value(),
+           resumed = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value();
   drive_to(uninterrupted, 0);
   for (int i = 1; i <= 8; ++i) add_wide_view(uninterrupted, 0, 0.1 * i);
   ASSERT_TRUE(uninterrupted.add(frame_of(images_of("narrow", 0), "narrow", 0, 1)).value().has_value());
@@ -225,7 +233,7 @@ struct StoredRover {
   testing::TemporaryFolder folder;
   Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
   TileStore tiles = TileStore::open(db).value();
-  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value();
 
   // Maps the first stop and collects views of the second; then restores the state, so that map tiles are only in the
   // store.
@@ -237,7 +245,7 @@ struct StoredRover {
     add_wide_view(pipeline, kFrames - 1);
     ASSERT_TRUE(db.execute("BEGIN IMMEDIATE") && pipeline.flush_maps() && db.execute("COMMIT"));
     const Bytes memory = pipeline.save();
-    pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
+    pipeline = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value();
     pipeline.store_maps_in(tiles);
     ASSERT_TRUE(pipeline.restore(memory, tiles));
     for (const FrameKey& key : pipeline.pending_frames()) {
@@ -304,8 +312,8 @@ TEST(PipelineMaps, DamagedTileLeavesStateUnchanged) {
 }
 
 TEST(PipelineMaps, FramesOfWrongSizeLeaveStateUnchanged) {
-  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value(),
-           reference = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value(),
+           reference = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value();
   const Image<std::uint8_t> cut(100, 100);
   const auto expect_rejected = [&](const char* pair, int position_id, double seconds) {
     StereoFrame frame = frame_of(images_of(pair, 0), pair, position_id, seconds);
@@ -330,8 +338,8 @@ TEST(PipelineMaps, FramesOfWrongSizeLeaveStateUnchanged) {
 }
 
 TEST(PipelineMaps, EarlyViewsOfOnlyOneStopAreRetained) {
-  Pipeline pipeline = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value(),
-           other = Pipeline::create(mapping_rover(), {}, ThreadPool(2)).value();
+  Pipeline pipeline = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value(),
+           other = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(2)).value();
   for (int id = 0; id < 4; ++id) {
     const StereoFrame view = frame_of(images_of("wide", 0), "wide", id, 5.0 * (id + 1));
     ASSERT_FALSE(pipeline.add(view).value().has_value());

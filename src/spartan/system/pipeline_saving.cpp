@@ -12,7 +12,7 @@ namespace spartan {
 
 namespace {
 
-constexpr std::uint32_t kPipelineVersion = 13;  // of save(); raise it when the saved state changes
+constexpr std::uint32_t kPipelineVersion = 14;  // of save(); raise it when the saved state changes
 
 }  // namespace
 
@@ -32,8 +32,8 @@ Bytes Pipeline::save() const {
   out.put(s.reference.odom_from_body);
   out.put_array(s.velocity.data(), 6);
   out.put(s.distance_m);
-  out.put(s.distance_of_last_terrain_m);
   s.frozen_cameras.save(out);
+  s.terrain_stage.save(out);
   s.stop_stage.save(out);
   s.keyframe_stage.save(out);
   const bool odometry_only = s.options.odometry_only;
@@ -49,7 +49,7 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   const std::string what = "run.sqlite: saved state of the pipeline";
   if (Status status = in.expect_version(kPipelineVersion, what); !status) return status;
   State& s = *state_;
-  s.keyframe_task = {};
+  s.keyframe_map = nullptr;
   s.started = in.get<bool>();
   s.last_stamp = in.get_stamp();
   const bool has_up = in.get<bool>();
@@ -64,8 +64,8 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
   const std::vector<double> velocity = in.get_array<double>();
   if (velocity.size() == 6) s.velocity = Eigen::Map<const Vector6d>(velocity.data());
   s.distance_m = in.get_finite();
-  s.distance_of_last_terrain_m = in.get_finite();
   s.frozen_cameras.restore(in);
+  s.terrain_stage.restore(in);
   s.stop_stage.restore(in);
   s.keyframe_stage.restore(in);
   std::array<Bytes, 5> stages;
@@ -96,10 +96,11 @@ Status Pipeline::restore(const Bytes& state, TileStore& maps) {
 std::vector<FrameKey> Pipeline::pending_frames() const {
   const State& s = *state_;
   std::vector<FrameKey> pending;
-  if (const auto stamp = s.stop_stage.pending_first_frame()) pending.push_back({s.pair.name, *stamp});
-  if (const auto stamp = s.keyframe_stage.pending_frame()) pending.push_back({s.pair.name, *stamp});
-  const auto& views = s.stop_stage.pending_views();
-  pending.insert(pending.end(), views.begin(), views.end());
+  for (const auto& stamp : {s.terrain_stage.pending_frame(), s.keyframe_stage.pending_frame()}) {
+    if (stamp) pending.push_back({s.pair.name, *stamp});
+  }
+  const std::vector<FrameKey> of_stops = s.stop_stage.pending_frames(s.pair.name);
+  pending.insert(pending.end(), of_stops.begin(), of_stops.end());
   return pending;
 }
 
@@ -113,8 +114,11 @@ Status Pipeline::restore_frame(const StereoFrame& frame) {
   const auto rectified = s.imager.process(frame);
   if (!rectified) return failure(rectified);
   if (pair->name != s.pair.name)
-    return s.stop_stage.add_view(frame.position_id, pair->name, *rectified, pair->nearest_m);
-  if (s.keyframe_stage.pending_frame() == rectified->stamp) {
+    return s.stop_stage.restore_view(pair->name, *rectified, pair->nearest_m, frame.position_id, s.back_end);
+  // A frame may be pending for several reasons, and is then listed and passed in several times.
+  if (s.terrain_stage.pending_frame() == rectified->stamp) {
+    s.terrain_stage.restore_frame(*rectified, s.pair.nearest_m, s.disparity_computer, s.back_end);
+  } else if (s.keyframe_stage.pending_frame() == rectified->stamp) {
     s.keyframe_stage.restore_frame(*rectified);
   } else {
     s.stop_stage.restore_first_frame(*rectified, s.pair.nearest_m);

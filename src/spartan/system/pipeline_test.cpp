@@ -60,7 +60,9 @@ TEST(Pipeline, TracksMotionWithAPanningMast) {
 }
 
 TEST(Pipeline, FirstFrameHasTerrain) {
-  Pipeline pipeline = pipeline_of();
+  RunOptions options;
+  options.terrain.delay_frames = 0;
+  Pipeline pipeline = pipeline_of(options);
   const FrameResult first = push(pipeline, 0);
   ASSERT_TRUE(first.terrain);
   int known = 0, correct = 0;
@@ -75,7 +77,7 @@ TEST(Pipeline, FirstFrameHasTerrain) {
   EXPECT_GT(known, 5000);
   EXPECT_GT(correct, 0.95 * known);
   // A triangulated point lies on the ground.
-  const RectifiedStereo& geometry = first.terrain->pair.geometry;
+  const RectifiedStereo& geometry = first.terrain->geometry;
   const Eigen::Vector3d in_left = geometry.triangulate(160, 200, first.terrain->disparity(160, 200));
   const Eigen::Vector3d point = first.terrain->world_from_left * in_left;
   EXPECT_NEAR(point.z(), 0, 0.2);
@@ -85,6 +87,7 @@ TEST(Pipeline, FirstFrameHasTerrain) {
 TEST(Pipeline, DenseDisparitiesAreSharedByOdometryAndTerrain) {
   RunOptions options;
   options.terrain.every_m = 0;  // terrain for every frame
+  options.terrain.delay_frames = 0;
   Pipeline row = pipeline_of(options);
   const auto set = set_option(options, "odometry.reconstruction.source=dense");
   ASSERT_TRUE(set) << set.error().message();

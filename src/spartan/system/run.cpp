@@ -191,7 +191,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
                               const RunHooks& given_hooks) {
   const StreamInfo& info = source.stream.info();
   const ThreadPool workers(request.threads);
-  auto setup = set_up_run(source.stream, request, workers);
+  auto setup = set_up_run(source.stream, request, workers, source.recording ? Pace::recorded : Pace::live);
   if (!setup) return failure(setup);
   const Rig& rig = setup->rig;
   const RunOptions& options = setup->options;

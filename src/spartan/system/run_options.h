@@ -25,6 +25,7 @@ struct TerrainOptions {
   int point_step_px = 2;          ///< subsampling of the point cloud, px
   double max_range_error = 0.05;  ///< maximum relative range error of a point at 0.3 px of disparity error
   double max_range_m = 0;         ///< maximum distance of a point from the camera, m; 0: no limit
+  int delay_frames = 10;          ///< frames from a view to the one with which it is delivered
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -47,6 +48,10 @@ struct TerrainOptions {
             "Maximum distance of a point of the cloud from the camera in metres; raising it keeps more distant points, "
             "0 keeps all that max_range_error allows.",
             at_least(0));
+    v.field("delay_frames", delay_frames,
+            "The back end computes the disparities of a view while the odometry goes on; they are delivered at most so "
+            "many frames later. Raising it lets slow cores keep up; 0 waits for them.",
+            between(0, 100));
   }
 };
 
@@ -105,7 +110,8 @@ struct RunOptions {
   bool maps = true;                            ///< make local maps
   MapSource maps_from = MapSource::automatic;  ///< of which frames
   KeyframeOptions keyframes;
-  SlamOptions slam;  ///< map matching and the global map
+  int stop_delay_frames = 10;  ///< most frames from leaving a stop to the frame whose pose its map corrects
+  SlamOptions slam;            ///< map matching and the global map
   LocalizationOptions localization;
   bool smoothed_trajectory = true;  ///< run(): smooth the localization after the last frame
   TerrainOptions terrain;
@@ -141,6 +147,11 @@ struct RunOptions {
             "other than the odometry pair, keyframes maps single frames of the odometry pair while the rover drives, "
             "auto takes stops where the recording has frames of another pair, else keyframes.");
     v.group("keyframes", keyframes);
+    v.field("stop_delay_frames", stop_delay_frames,
+            "The back end makes the map of a stop while the odometry goes on; its correction is applied to the pose at "
+            "most so many frames after the rover left the stop. Raising it lets slow cores keep up, and corrects the "
+            "pose later.",
+            between(0, 1000));
     v.group("mapping", mapping);
     v.group("slam", slam);
     v.group("localization", localization);

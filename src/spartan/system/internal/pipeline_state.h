@@ -3,14 +3,17 @@
 #pragma once
 
 #include <ctime>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "spartan/localization/localizer.h"
 #include "spartan/reconstruction/disparity_computer.h"
+#include "spartan/system/internal/back_end.h"
 #include "spartan/system/internal/frozen_cameras.h"
 #include "spartan/system/internal/keyframe_stage.h"
 #include "spartan/system/internal/stop_stage.h"
+#include "spartan/system/internal/terrain_stage.h"
 #include "spartan/system/pipeline.h"
 
 namespace spartan {
@@ -30,23 +33,27 @@ inline bool has_both_images(const RectifiedPair& pair) {
 struct Pipeline::State {
   // The options are valid, so that create() of a stage cannot fail.
   State(Rig rig_in, const RunOptions& options_in, Imager imager_in, const StereoPair& pair_in,
-        const ThreadPool& workers_in)
+        const ThreadPool& workers_in, Pace pace_in)
       : rig(std::move(rig_in)),
         options(options_in),
         pair(pair_in),
+        workers(workers_in),
         imager(std::move(imager_in)),
+        pace(pace_in),
+        back_end(workers_in, pace_in == Pace::live),
         odometer(Odometer::create(options_in.odometry, workers_in).value()),
-        disparity_computer(DisparityComputer::create(options_in.reconstruction, workers_in).value()),
+        disparity_computer(DisparityComputer::create(options_in.reconstruction, disparity_workers()).value()),
         localizer(Localizer::create(internal::with_gravity(options_in)).value()),
         odometry_filter(VisionOnlyFilter::create(internal::with_gravity(options_in)).value()),
         slam_filter(VisionOnlyFilter::create(internal::with_gravity(options_in)).value()),
         dead_reckoning(DeadReckoning::create(options_in.localization.vision).value()),
-        stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, workers_in).value()),
+        terrain_stage(options_in.terrain),
+        stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, back_end.workers()).value(),
+                   options_in.stop_delay_frames),
         keyframe_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, ThreadPool(1)).value(),
                        options_in.keyframes, options_in.mapping.map.extent_m),
         merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers_in).value()),
-        frozen_cameras(rig.pairs.size()),
-        workers(workers_in) {
+        frozen_cameras(rig.pairs.size()) {
     const bool several = rig.pairs.size() > 1, maps = options.maps && !options.odometry_only;
     maps_keyframes =
         maps && (options.maps_from == MapSource::keyframes || (options.maps_from == MapSource::automatic && !several));
@@ -55,20 +62,32 @@ struct Pipeline::State {
     if (options.smoothed_trajectory && !options.odometry_only) localizer.keep_inputs();
   }
 
+  // The jobs of the back end use the other members.
+  ~State() { back_end.stop(); }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  bool odometry_is_dense() const { return options.odometry.reconstruction.source == DisparitySource::dense; }
+  // Only the odometry uses dense disparities in the front end.
+  const ThreadPool& disparity_workers() const { return odometry_is_dense() ? workers : back_end.workers(); }
+
   Rig rig;
   RunOptions options;
   StereoPair pair;
+  ThreadPool workers;
   Imager imager;
+  Pace pace;
+  internal::BackEnd back_end;
   Odometer odometer;
-  DisparityComputer disparity_computer;
+  DisparityComputer disparity_computer;  // of dense odometry, else of the jobs of terrain_stage
   Localizer localizer;
   VisionOnlyFilter odometry_filter, slam_filter;  // poses of the odometry, without and with map corrections
   DeadReckoning dead_reckoning;                   // replaces the three filters if the odometry runs alone
+  internal::TerrainStage terrain_stage;
   internal::StopStage stop_stage;
   internal::KeyframeStage keyframe_stage;
   MapMerger merger;
   internal::FrozenCameras frozen_cameras;
-  ThreadPool workers;
   bool maps_stops = false, maps_keyframes = false, computes_terrain = false;
   StageClock clock;
 
@@ -88,7 +107,7 @@ struct Pipeline::State {
   Reference reference;
   Vector6d velocity = Vector6d::Zero();  // tangent of previous_from_current in the body frame, per second
   double distance_m = 0;
-  double distance_of_last_terrain_m = -1;
+  bool view_was_dropped = false;  // the last view
 
   std::size_t index_of(const StereoPair& of) const { return static_cast<std::size_t>(&of - rig.pairs.data()); }
   LocalizationEstimate localized_at(Stamp stamp) const;
@@ -104,25 +123,31 @@ struct Pipeline::State {
   Status add_odometry_frame(const StereoFrame& frame, const RectifiedPair& rectified, const RelativeMotion& motion);
   void apply_map_constraint(const internal::StopSurvey& survey, const PoseConstraint& constraint);
   Status add_view(const StereoFrame& frame);
+  bool is_made(internal::BackEnd::Ticket ticket) const { return pace == Pace::recorded || back_end.is_done(ticket); }
+  Status start_maps();
+  Result<std::optional<MappedStop>> apply_due_map(bool leaves_stop);
+  Status start_stop_match();
+  Result<std::optional<MappedStop>> map_at_departure();
+  Result<MappedStop> finish_departed_stop();
   Result<std::optional<MappedStop>> finish_stop();
   Status start_keyframe_map();
-  void make_keyframe_map(const std::optional<MapExcerpt>& global);
   Result<MappedStop> finish_keyframe();
   MappedStop apply(const internal::StopSurvey& survey, MapMergeResult merged);
   void update_keyframes(const RectifiedPair& rectified, const MotionEstimate& motion,
                         const RelativeMotion& body_motion);
-  bool terrain_is_due() const;
+  TerrainView take_terrain();
+  std::optional<TerrainView> take_ready_terrain();
+  void update_terrain(const RectifiedPair& rectified, const DisparityImage& dense);
   Status check_disparities(const RectifiedPair& rectified) const;
-  Result<DisparityImage> dense_disparity(const RectifiedPair& rectified);
   Result<DisparityImage> disparity_for_odometry(const RectifiedPair& rectified);
 
-  // The map of the pending keyframe, made by one thread beside the frames that follow it.
+  // The map of the pending keyframe; null before its job is submitted.
   struct KeyframeMap {
     Result<MapMergeResult> matched;
     StageClock clock{CLOCK_THREAD_CPUTIME_ID};
+    internal::BackEnd::Ticket ticket = 0;
   };
-  KeyframeMap keyframe_map;
-  BackgroundTask keyframe_task;  // the last member: it uses the others and ends before them
+  std::shared_ptr<KeyframeMap> keyframe_map;
 };
 
 }  // namespace spartan

@@ -122,23 +122,42 @@ Result<StreamRead> RunLoop::read() {
   return clock_.measure("camera", [&] { return stream_.read({}); });
 }
 
-// Commits what is complete only at the end of the recording: the map of the last stop and the stage times since the
-// last frame.
+// Commits what is complete only at the end of the stream: the maps of the last stops, the last terrain view and the
+// stage times since the last frame.
 Status RunLoop::finish() {
   clock_.take();  // discards the read attempt at the end of the recording
   complete_ = true;
-  auto stop = pipeline_.finish_stop();
-  if (!stop) return failure(stop);
-  RunStore::Step step;
-  if (*stop) {
-    const auto map = write_map_of(**stop);
+  bool any = false;
+  for (;;) {
+    const auto stop = pipeline_.finish_stop();
+    if (!stop) return failure(stop);
+    const std::optional<TerrainView> terrain = pipeline_.finish_terrain();
+    RunStore::Step step;
+    if (Status written = write_files(terrain, *stop, step); !written) return written;
+    step.times = take_stage_times();
+    step.localization_inputs = pipeline_.take_localization_inputs();
+    const bool last = !*stop && !terrain;
+    any = any || !last || !step.times.empty();
+    if (frames_ == 0 || !any) return {};
+    if (last) return checkpoint(step);
+    if (Status committed = store_.commit(step); !committed) return committed;
+  }
+}
+
+Status RunLoop::write_files(const std::optional<TerrainView>& terrain, const std::optional<MappedStop>& stop,
+                            RunStore::Step& step) {
+  if (terrain) {
+    auto written =
+        clock_.measure("terrain", [&] { return write_terrain(*terrain, request_.options.terrain, folder_.terrain()); });
+    if (!written) return failure(written);
+    step.terrain = *written;
+  }
+  if (stop) {
+    const auto map = write_map_of(*stop);
     if (!map) return failure(map);
     step.map = *map;
   }
-  step.times = take_stage_times();
-  step.localization_inputs = pipeline_.take_localization_inputs();
-  if (frames_ == 0 || (!step.map && step.times.empty())) return {};
-  return checkpoint(step);
+  return {};
 }
 
 std::vector<StageTime> RunLoop::take_stage_times() {
@@ -212,17 +231,7 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
   if (output.motion.status == TrackingStatus::lost) {
     hooks_.log.warning(fmt::format("frame {}: odometry lost: {}", output.frame_id, output.motion.reason));
   }
-  if (output.terrain) {
-    auto written = clock_.measure(
-        "terrain", [&] { return write_terrain(*output.terrain, request_.options.terrain, folder_.terrain()); });
-    if (!written) return failure(written);
-    step.terrain = *written;
-  }
-  if (output.stop) {
-    const auto map = write_map_of(*output.stop);
-    if (!map) return failure(map);
-    step.map = *map;
-  }
+  if (Status written = write_files(output.terrain, output.stop, step); !written) return written;
   record.times = take_stage_times();
   record.times.insert(record.times.end(), output.times.begin(), output.times.end());
   return commit(step);

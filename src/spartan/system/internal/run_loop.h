@@ -66,6 +66,9 @@ class RunLoop {
   Status seek(const RunStore::Checkpoint& checkpoint);
   Status process(const Sample& sample);
   Status finish();
+  /// Writes the files of what the back end has made, and adds their records to the step.
+  Status write_files(const std::optional<TerrainView>& terrain, const std::optional<MappedStop>& stop,
+                     RunStore::Step& step);
   Result<MapRecord> write_map_of(const MappedStop& stop);
   /// `fault`: of the image that is missing; empty where both are there.
   Status process_frame(const StereoFrame& frame, std::string_view fault = {});

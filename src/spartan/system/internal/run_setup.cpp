@@ -50,11 +50,11 @@ std::string level_text(const Eigen::Vector3d& up_in_body) {
 
 }  // namespace
 
-Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers) {
+Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers, Pace pace) {
   const StreamInfo& info = source.info();
   const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
   RunOptions options = options_of(source, request);
-  auto pipeline = Pipeline::create(info.rig, options, workers, mask_folder);
+  auto pipeline = Pipeline::create(info.rig, options, workers, mask_folder, pace);
   if (!pipeline) return failure(pipeline);
   if (Status fits = pipeline->check_memory(request.memory_bytes); !fits) return failure(fits);
   if (Status usable = check_run_folder({request.output}, request.resume || request.replace); !usable)
@@ -81,7 +81,7 @@ Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, con
     }
     if (unknown_up) ground_up = scale->up_in_body;
   }
-  if (!aligned.sentences.empty()) pipeline = Pipeline::create(aligned.rig, options, workers, mask_folder);
+  if (!aligned.sentences.empty()) pipeline = Pipeline::create(aligned.rig, options, workers, mask_folder, pace);
   if (!pipeline) return failure(pipeline);
   if (ground_up) {
     pipeline->align_with_ground(*ground_up);

@@ -26,6 +26,6 @@ struct RunSetup {
 
 /// Checks that the run fits into memory and that its folder can be used before anything takes long. Codes: `usage`,
 /// `input`, `output`, `resources`.
-Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers);
+Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers, Pace pace);
 
 }  // namespace spartan::internal

@@ -26,16 +26,15 @@ double known_percent(ImageView<const float> disparity) {
 }  // namespace
 
 Result<TerrainRecord> write_terrain(const TerrainView& view, const TerrainOptions& options, const std::string& folder) {
-  const std::string path = stem(folder, view.pair.stamp);
+  const std::string path = stem(folder, view.stamp);
   // Δz / z = Δd / d: a bound on the relative range error is a lower bound on the disparity.
   const CloudSampling sampling{options.point_step_px, kDisparityErrorPx / options.max_range_error, options.max_range_m};
-  const PointCloud cloud = to_point_cloud(view.disparity, view.sigma, view.pair.left, view.pair.geometry,
-                                          view.world_from_left, view.pair.stamp, sampling);
+  const PointCloud cloud =
+      to_point_cloud(view.disparity, view.sigma, view.left, view.geometry, view.world_from_left, view.stamp, sampling);
   if (Status s = write_pfm(path + ".pfm", view.disparity); !s) return failure(s);
   if (Status s = write_png(path + ".png", colour_disparity(view.disparity)); !s) return failure(s);
   if (Status s = write_ply(path + ".ply", cloud); !s) return failure(s);
-  return TerrainRecord{view.pair.stamp, view.pair.pair, known_percent(view.disparity),
-                       static_cast<std::int64_t>(cloud.size())};
+  return TerrainRecord{view.stamp, view.pair, known_percent(view.disparity), static_cast<std::int64_t>(cloud.size())};
 }
 
 Result<PointCloud> terrain_cloud(const std::string& folder, const std::vector<TerrainRecord>& terrain) {

@@ -1,0 +1,109 @@
+#include "spartan/system/internal/back_end.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <utility>
+
+namespace spartan::internal {
+namespace {
+
+// On Linux the nice value is that of a thread. Where the system does not allow it, the thread runs like the others.
+void lower_priority(int by) {
+  const auto thread = static_cast<id_t>(::gettid());
+  static_cast<void>(::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + by));
+}
+
+}  // namespace
+
+BackEnd::BackEnd(const ThreadPool& workers, bool own_thread)
+    : pool_(workers), loops_(own_thread ? ThreadPool(1) : workers), own_thread_(own_thread) {}
+
+BackEnd::Ticket BackEnd::submit(std::function<void()> job) {
+  const Lock lock(mutex_);
+  jobs_.push_back(std::move(job));
+  if (own_thread_ && !thread_.joinable()) thread_ = std::thread([this] { run_thread(); });
+  if (!own_thread_) start_pump();
+  changed_.notify_all();
+  return ++submitted_;
+}
+
+bool BackEnd::is_done(Ticket ticket) const {
+  const Lock lock(mutex_);
+  return finished_ >= ticket;
+}
+
+std::uint64_t BackEnd::backlog() const {
+  const Lock lock(mutex_);
+  return submitted_ - finished_;
+}
+
+// With the lock, which it releases while the job runs.
+void BackEnd::run_next(Lock& lock) {
+  const std::function<void()> job = std::move(jobs_.front());
+  jobs_.pop_front();
+  busy_ = true;
+  lock.unlock();
+  std::exception_ptr error;
+  try {
+    job();
+  } catch (...) {
+    error = std::current_exception();
+  }
+  lock.lock();
+  busy_ = false;
+  ++finished_;
+  if (error && !error_) error_ = error;
+  changed_.notify_all();
+}
+
+void BackEnd::wait(Ticket ticket) {
+  Lock lock(mutex_);
+  ++waiting_;  // the pump leaves the next job to this thread
+  while (finished_ < ticket && !stopped_) {
+    if (!own_thread_ && can_run()) {
+      run_next(lock);
+    } else {
+      changed_.wait(lock, [&] { return finished_ >= ticket || stopped_ || (!own_thread_ && can_run()); });
+    }
+  }
+  --waiting_;
+  if (!own_thread_) start_pump();
+  if (error_) std::rethrow_exception(error_);
+}
+
+// With the lock. A pool of one thread has no worker.
+void BackEnd::start_pump() {
+  if (pumping_ || !can_run() || waiting_ > 0 || pool_.threads() == 1) return;
+  pumping_ = true;
+  pump_task_ = pool_.start([this] { pump(); });
+}
+
+void BackEnd::pump() {
+  Lock lock(mutex_);
+  while (can_run() && waiting_ == 0) run_next(lock);
+  pumping_ = false;
+}
+
+void BackEnd::run_thread() {
+  lower_priority(kNiceness);
+  Lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [this] { return stopped_ || can_run(); });
+    if (stopped_) return;
+    run_next(lock);
+  }
+}
+
+void BackEnd::stop() {
+  {
+    const Lock lock(mutex_);
+    stopped_ = true;
+    jobs_.clear();
+    changed_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+  pump_task_ = {};
+}
+
+}  // namespace spartan::internal
