@@ -75,7 +75,7 @@ class Consistency : public ::testing::Test {
             body_from_rectified_.inverse() * motion * body_from_rectified_ * exp_se3(deviations_.cwiseProduct(error));
         frame.motion.covariance = deviations_.cwiseAbs2().asDiagonal();
       }
-      ASSERT_TRUE(store->commit({frame, {}, {}, {}}).has_value());
+      ASSERT_TRUE(store->commit({RunStore::Step{frame, {}, {}, {}}}).has_value());
     }
   }
   Result<MotionConsistency> consistency(std::vector<double> lengths_m) const {

@@ -190,7 +190,7 @@ void GlobalMap::evict_tiles() {
   for (auto& [key, slot] : tiles_) {
     if (!slot.tile) continue;
     ++in_memory;
-    if (!slot.changed) clean.push_back(&slot);
+    if (!slot.changed && slot.taken <= changes_stored_) clean.push_back(&slot);
   }
   std::sort(clean.begin(), clean.end(), [](const Slot* a, const Slot* b) { return a->used < b->used; });
   for (Slot* slot : clean) {
@@ -313,22 +313,34 @@ Status GlobalMap::merge(GlobalMap& other) {
 
 Status GlobalMap::flush() {
   if (store_ == nullptr) return {};
-  if (submaps_stored_ == 0 && !submaps_.empty()) {
-    if (Status s = store_->write_property("cell_m", cell_m_); !s) return s;
-  }
-  for (; submaps_stored_ < submaps_.size(); ++submaps_stored_) {
-    if (Status s = store_->write(submaps_[submaps_stored_]); !s) return s;
-  }
-  for (; stops_stored_ < stops_.size(); ++stops_stored_) {
-    if (Status s = store_->write(stops_[stops_stored_]); !s) return s;
-  }
+  const MapChanges changes = take_changes();
+  if (Status s = store_->write(changes); !s) return s;
+  changes_stored(changes.number);
+  return {};
+}
+
+MapChanges GlobalMap::take_changes() {
+  MapChanges changes;
+  changes.number = ++changes_taken_;
+  if (submaps_stored_ == 0 && !submaps_.empty()) changes.cell_m = cell_m_;
+  const auto rest = [](const auto& all, std::size_t& taken) {
+    const auto first = all.begin() + static_cast<std::ptrdiff_t>(std::exchange(taken, all.size()));
+    return std::decay_t<decltype(all)>(first, all.end());
+  };
+  changes.submaps = rest(submaps_, submaps_stored_);
+  changes.stops = rest(stops_, stops_stored_);
   for (auto& [key, slot] : tiles_) {
     if (!slot.changed) continue;
-    if (Status s = store_->write({key, slot.revision}, *slot.tile); !s) return s;
+    changes.tiles.emplace_back(TileEntry{key, slot.revision}, *slot.tile);
     slot.changed = false;
+    slot.taken = changes.number;
   }
+  return changes;
+}
+
+void GlobalMap::changes_stored(std::uint64_t number) {
+  changes_stored_ = std::max(changes_stored_, number);
   evict_tiles();
-  return {};
 }
 
 Status GlobalMap::copy_to(TileStore& store) {

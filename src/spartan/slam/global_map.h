@@ -123,6 +123,10 @@ class GlobalMap {
 
   /// Writes all changes to the store, inside its current transaction, and then evicts tiles beyond the memory limit.
   Status flush();
+  /// The same for a store that another thread writes: a copy of all changes since the last call. Their tiles are
+  /// evicted only after changes_stored() with their number.
+  MapChanges take_changes();
+  void changes_stored(std::uint64_t number);
   /// Writes the whole map into an empty store.
   Status copy_to(TileStore& store);
 
@@ -142,6 +146,7 @@ class GlobalMap {
     std::int64_t revision = 0;   // number of stops in the map at its latest change, whenever it was stored
     std::unique_ptr<Tile> tile;  // null: evicted
     bool changed = false;
+    std::uint64_t taken = 0;  // number of the changes with its latest content
     std::uint64_t used = 0;
   };
   static_assert(sizeof(Slot) < sizeof(Tile) / 100, "an evicted tile must need little memory");
@@ -162,6 +167,7 @@ class GlobalMap {
   std::size_t submaps_stored_ = 0, stops_stored_ = 0;
   std::map<TileKey, Slot> tiles_;
   std::uint64_t clock_ = 0;
+  std::uint64_t changes_taken_ = 0, changes_stored_ = 0;
 };
 
 /// Statistics of the observed cells; all 0 where there are none.

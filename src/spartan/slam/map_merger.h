@@ -100,6 +100,9 @@ class MapMerger {
   void page_to(TileStore* store) { map_.page_to(store); }
   /// Writes all changes to the store, inside its current transaction.
   Status flush() { return map_.flush(); }
+  /// As GlobalMap::take_changes() and GlobalMap::changes_stored().
+  MapChanges take_changes() { return map_.take_changes(); }
+  void changes_stored(std::uint64_t number) { map_.changes_stored(number); }
   /// The state that belongs to the flushed tables, versioned.
   Bytes save() const;
   /// Restores the state of `save()` with the tables of that moment. Codes: `store_damaged` where the bytes

@@ -198,6 +198,22 @@ Status TileStore::write_property(const std::string& key, double value) {
   return insert->bind(1, key).bind(2, value).run();
 }
 
+Status TileStore::write(const MapChanges& changes) {
+  if (changes.cell_m) {
+    if (Status s = write_property("cell_m", *changes.cell_m); !s) return s;
+  }
+  for (const Submap& submap : changes.submaps) {
+    if (Status s = write(submap); !s) return s;
+  }
+  for (const MapStop& stop : changes.stops) {
+    if (Status s = write(stop); !s) return s;
+  }
+  for (const auto& [entry, tile] : changes.tiles) {
+    if (Status s = write(entry, tile); !s) return s;
+  }
+  return {};
+}
+
 Result<std::optional<double>> TileStore::property(const std::string& key) {
   auto select = db_->prepare("SELECT value FROM map_properties WHERE key = ?");
   if (!select) return failure(select);

@@ -112,6 +112,21 @@ Bytes to_bytes(const Tile& tile);
 /// Code `input` where the bytes are of another version or damaged; `what` names them in the error.
 Result<Tile> tile_from_bytes(const Bytes& bytes, const std::string& what);
 
+/// One tile at one revision.
+struct TileEntry {
+  TileKey key;
+  std::int64_t revision = 0;
+};
+
+/// What has changed in a global map since it was stored; a copy.
+struct MapChanges {
+  std::uint64_t number = 0;      ///< for GlobalMap::changes_stored()
+  std::optional<double> cell_m;  ///< of a map that was never stored
+  std::vector<Submap> submaps;   ///< new ones
+  std::vector<MapStop> stops;    ///< new ones
+  std::vector<std::pair<TileEntry, Tile>> tiles;
+};
+
 /// Writes take part in the current transaction of the database; its owner commits. Tables (all `map_…`):
 /// map_tiles (submap, ix, iy, revision → checksum, cells), map_submaps (id → anchor), map_stops (id → stamp, pose,
 /// covariance), map_properties (key → value). Only the newest revision of a tile is kept.
@@ -122,10 +137,7 @@ class TileStore {
   /// Opens existing tables of a database that may be read-only.
   static Result<TileStore> open_existing(Database& db);
 
-  struct Entry {
-    TileKey key;
-    std::int64_t revision = 0;
-  };
+  using Entry = TileEntry;
   /// All tiles in the order of their keys, with their newest revisions.
   Result<std::vector<Entry>> index();
   Status write(const Entry& entry, const Tile& tile);
@@ -137,6 +149,7 @@ class TileStore {
   Status write(const MapStop& stop);
   Result<std::vector<MapStop>> stops();
   Status write_property(const std::string& key, double value);
+  Status write(const MapChanges& changes);
   Result<std::optional<double>> property(const std::string& key);
 
  private:

@@ -340,6 +340,12 @@ void Pipeline::store_maps_in(TileStore& store) {
 Status Pipeline::flush_maps() {
   return state_->merger.flush();
 }
+MapChanges Pipeline::take_map_changes() {
+  return state_->merger.take_changes();
+}
+void Pipeline::map_changes_stored(std::uint64_t number) {
+  state_->merger.changes_stored(number);
+}
 GlobalMap& Pipeline::global_map() {
   return state_->merger.map();
 }

@@ -107,6 +107,9 @@ class Pipeline {
   /// empty. Borrowed. flush_maps() writes all changes, inside the current transaction of the store's database.
   void store_maps_in(TileStore& store);
   Status flush_maps();
+  /// The same where another thread writes: `store` is read only, and tiles are paged out after map_changes_stored().
+  MapChanges take_map_changes();
+  void map_changes_stored(std::uint64_t number);
   GlobalMap& global_map();
 
   /// For the end of a drive: waits for the map of a stop, the current one included, or of a keyframe, and applies it.

@@ -150,7 +150,8 @@ RunFacts facts_of(const RunRequest& request, const RunSource& source, const RunO
   facts.version = request.version;
   facts.input = source.stream.info().path;
   facts.format = source.recording ? name_of(source.recording->info().format) : "live";
-  if (source.queue) facts.live = LiveFacts{run_loop.latencies(), source.queue->dropped(), source.queue->peak_bytes()};
+  if (source.queue)
+    facts.live = LiveFacts{run_loop.latencies(), source.queue->dropped(), source.queue->peak_bytes(), 0};
   facts.gravity_measured = run_loop.gravity_measured();
   facts.heading_east = run_loop.heading_east();
   facts.slip_alarm = options.localization.wheels.slip_alarm;
@@ -159,6 +160,9 @@ RunFacts facts_of(const RunRequest& request, const RunSource& source, const RunO
   facts.sensor_rows_reversed = source.stream.discarded().reversed;
   facts.sensor_rows_unreadable = source.stream.discarded().unreadable;
   facts.resumed_from_frame = run_loop.resumed_from_frame();
+  const RecorderStatistics recorder = run_loop.recorder_statistics();
+  facts.commits = recorder.commits;
+  if (facts.live) facts.live->files_discarded = recorder.files_discarded;
   const ElapsedTime elapsed = run_loop.elapsed();
   facts.wall_seconds = elapsed.wall_s;
   facts.cpu_seconds = elapsed.cpu_s;
@@ -213,8 +217,11 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
   if (Status s = write_file_atomically(folder.rig(), identity.rig); !s) return failure(s);
 
-  RunLoop run_loop(request, hooks, source.samples(), source.recording, std::move(setup->pipeline), std::move(*store),
-                   folder, start.time, start.cpu_s);
+  auto recorder =
+      RunRecorder::create(std::move(*store), folder, options, source.recording ? Pace::recorded : Pace::live);
+  if (!recorder) return failure(recorder);
+  RunLoop run_loop(request, hooks, source.samples(), source.recording, std::move(setup->pipeline), std::move(*recorder),
+                   start.time, start.cpu_s);
   if (Status s = run_loop.begin(); !s) return failure(s);
   const Status processed = run_loop.process_samples();
   if (run_loop.usable_frames() > 0) replaced->discard();

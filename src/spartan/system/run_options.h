@@ -96,6 +96,32 @@ struct KeyframeOptions {
   }
 };
 
+/// When run() writes to the disk, on a thread of its own.
+struct CommitOptions {
+  double every_s = 1;         ///< most seconds from a result to the end of its transaction
+  double every_m = 0;         ///< path length after which results are committed at once, m; 0: no limit
+  bool at_maps = true;        ///< commit at once where a map was applied
+  double state_every_s = 30;  ///< seconds between two states from which the run can be resumed
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("every_s", every_s,
+            "Seconds after which results are committed to run.sqlite at the latest; raising it writes less to the disk "
+            "and loses more when the power fails, 0 commits each frame.",
+            between(0, 3600));
+    v.field("every_m", every_m,
+            "Path length in metres after which results are committed before every_s has passed; raising it writes less "
+            "to the disk, 0 sets no limit.",
+            at_least(0));
+    v.field("at_maps", at_maps,
+            "True commits as soon as the map of a stop or keyframe is in the global map; false waits for every_s.");
+    v.field("state_every_s", state_every_s,
+            "Seconds between two states (about 1 MB) from which --resume continues; raising it writes less to the disk "
+            "and lets a resumed run process more frames again.",
+            between(0, 3600));
+  }
+};
+
 /// The options of all modules, and which of them run.
 struct RunOptions {
   double gravity_m_s2 = 0;          ///< magnitude of gravity, m/s²; 0: as the recording specifies, else 9.81
@@ -115,6 +141,7 @@ struct RunOptions {
   LocalizationOptions localization;
   bool smoothed_trajectory = true;  ///< run(): smooth the localization after the last frame
   TerrainOptions terrain;
+  CommitOptions commit;
 
   template <class Visitor>
   void describe(Visitor& v) {
@@ -160,6 +187,7 @@ struct RunOptions {
             "(trajectory_smoothed.tum); false saves the time and the memory for it (1 kB for each frame, 60 bytes for "
             "each sample of the IMU).");
     v.group("terrain", terrain);
+    v.group("commit", commit);
   }
 };
 

@@ -139,7 +139,8 @@ Status RunStore::State::prepare() {
   if (!opened) return failure(opened);
   tiles.emplace(std::move(*opened));
   if (Status s =
-          db.execute(fmt::format("{} PRAGMA user_version={}; PRAGMA wal_autocheckpoint={}; PRAGMA secure_delete=0;",
+          db.execute(fmt::format("{} PRAGMA user_version={}; PRAGMA wal_autocheckpoint={}; PRAGMA secure_delete=0; "
+                                 "PRAGMA synchronous=FULL;",
                                  kAddedTables, kUserVersion, kLogPages));
       !s)
     return s;
@@ -239,9 +240,10 @@ Status RunStore::State::write(const Step& step) {
   return write(step.times);
 }
 
-Status RunStore::State::write_checkpoint(const Bytes& pipeline_state, const SourcePosition& source,
-                                         const ElapsedTime& elapsed) {
-  Bytes memory = pipeline_state;
+Status RunStore::State::write_checkpoint(const Checkpoint& checkpoint) {
+  const SourcePosition& source = checkpoint.source;
+  const ElapsedTime& elapsed = checkpoint.elapsed;
+  Bytes memory = checkpoint.pipeline_state;
   append_checksum(memory);
   if (Status s = replace_checkpoint->bind(1, source.samples_taken).bind(2, memory).run(); !s) return s;
   if (Status s = replace_elapsed->bind(1, 1e3 * elapsed.wall_s).bind(2, 1e3 * elapsed.cpu_s).run(); !s) return s;
@@ -365,13 +367,14 @@ Result<RunStore> RunStore::open_read_only(const std::string& path) {
   return RunStore(std::move(state));
 }
 
-Status RunStore::commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source,
-                        const ElapsedTime& elapsed) {
+Status RunStore::commit(const std::vector<Step>& steps, const std::optional<Checkpoint>& checkpoint,
+                        const MapChanges& maps) {
   return state_->commit([&]() -> Status {
-    if (Status s = state_->write(step); !s) return s;
-    const auto pipeline_state = save();
-    if (!pipeline_state) return failure(pipeline_state);
-    return state_->write_checkpoint(*pipeline_state, source, elapsed);
+    for (const Step& step : steps) {
+      if (Status s = state_->write(step); !s) return s;
+    }
+    if (Status s = state_->tiles->write(maps); !s) return s;
+    return checkpoint ? state_->write_checkpoint(*checkpoint) : Status();
   });
 }
 
@@ -388,10 +391,6 @@ Status RunStore::commit_smoothed(const std::vector<std::optional<UncertainPose>>
     }
     return {};
   });
-}
-
-Status RunStore::commit(const Step& step) {
-  return state_->commit([&] { return state_->write(step); });
 }
 
 }  // namespace spartan

@@ -1,8 +1,7 @@
-// RunStore: the SQLite database of a run, crash-safe, one transaction a frame (docs/reference/files.md).
+// RunStore: the SQLite database of a run, crash-safe (docs/reference/files.md).
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -109,14 +108,16 @@ class RunStore {
     std::int64_t samples_taken = 0;  ///< for Recording::seek()
     std::uint64_t content_hash = 0;  ///< Recording::content_hash()
   };
-  /// Writes the step in one transaction, completely or not at all. Codes: `output` if the file cannot be written, was
-  /// removed, or was changed by another process.
-  Status commit(const Step& step);
-  /// Writes in one transaction the step and a checkpoint, from which a run is resumed: the map tiles that `save`
-  /// flushes; the pipeline state after the step that `save` returns, the position in the recording and the time (only
-  /// the latest are kept). Codes: as above, and those of `save`.
-  Status commit(const Step& step, const std::function<Result<Bytes>()>& save, const SourcePosition& source,
-                const ElapsedTime& elapsed = {});
+  /// State from which a run is resumed. Only the latest is kept.
+  struct Checkpoint {
+    Bytes pipeline_state;  ///< Pipeline::save() after the last step
+    SourcePosition source;
+    ElapsedTime elapsed{};
+  };
+  /// Writes the steps, and a checkpoint with the changes of the map up to it, in one transaction, completely or not at
+  /// all. Codes: `output` if the file cannot be written, was removed, or was changed by another process.
+  Status commit(const std::vector<Step>& steps, const std::optional<Checkpoint>& checkpoint = {},
+                const MapChanges& maps = {});
 
   /// Writes FrameRecord::smoothed of every frame, in their order. Codes: as commit().
   Status commit_smoothed(const std::vector<std::optional<UncertainPose>>& poses);
@@ -131,12 +132,6 @@ class RunStore {
   Result<std::vector<TerrainRecord>> terrain();
   Result<std::vector<MapRecord>> maps();
 
-  /// State from which a run is resumed.
-  struct Checkpoint {
-    Bytes pipeline_state;  ///< Pipeline::save()
-    SourcePosition source;
-    ElapsedTime elapsed;
-  };
   /// The latest checkpoint; none before the first commit.
   Result<std::optional<Checkpoint>> checkpoint();
 

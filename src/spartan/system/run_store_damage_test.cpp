@@ -43,7 +43,7 @@ RunStore::Step full_step(int i) {
 }
 
 Status commit_step(RunStore& store, int i) {
-  return store.commit(full_step(i), [] { return Result<Bytes>(Bytes{1, 2, 3}); }, {i + 1, 7});
+  return store.commit({full_step(i)}, RunStore::Checkpoint{{1, 2, 3}, {i + 1, 7}});
 }
 
 // The first error that reading everything gives.

@@ -26,11 +26,8 @@ RunStore::Step step_of_frame(int i) {
 }
 
 Status commit_frame(RunStore& store, int i) {
-  return store.commit(step_of_frame(i),
-                      [] {
-                        return Result<Bytes>(Bytes{1, 2, 3});
-                      },
-                      {i + 1, 0xABCDEF0123456789U + static_cast<std::uint64_t>(i)});
+  return store.commit({step_of_frame(i)},
+                      RunStore::Checkpoint{{1, 2, 3}, {i + 1, 0xABCDEF0123456789U + static_cast<std::uint64_t>(i)}});
 }
 
 class RunStoreGuard : public ::testing::Test {
@@ -73,8 +70,8 @@ TEST_F(RunStoreGuard, AFrameIsNotWrittenTwiceByTwoProcesses) {
   RunStore first = create();
   ASSERT_TRUE(commit_frame(first, 0));
   RunStore second = resume();
-  ASSERT_TRUE(second.commit(step_of_frame(1)));
-  const Status late = first.commit(step_of_frame(1));
+  ASSERT_TRUE(second.commit({step_of_frame(1)}));
+  const Status late = first.commit({step_of_frame(1)});
   ASSERT_FALSE(late);
   EXPECT_EQ(late.error().code, ErrorCode::output);
 }

@@ -60,6 +60,16 @@ MapRecord some_map(int i) {
   return map;
 }
 
+Status commit(RunStore&& store, const RunStore::Step& step,
+              const std::optional<RunStore::Checkpoint>& checkpoint = std::nullopt) {
+  return store.commit({step}, checkpoint);
+}
+
+Status commit(RunStore& store, const RunStore::Step& step,
+              const std::optional<RunStore::Checkpoint>& checkpoint = std::nullopt) {
+  return store.commit({step}, checkpoint);
+}
+
 TEST(RunStore, ReadsCommittedRecordsBitForBit) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
@@ -70,17 +80,11 @@ TEST(RunStore, ReadsCommittedRecordsBitForBit) {
       const std::optional<TerrainRecord> terrain =
           i == 2 ? std::optional(TerrainRecord{some_frame(i).stamp, "narrow", 91.5, 1234}) : std::nullopt;
       const std::optional<MapRecord> map = i == 1 ? std::optional(some_map(i)) : std::nullopt;
-      ASSERT_TRUE(store->commit({some_frame(i), terrain, map, {}},
-                                [&] {
-                                  return Bytes{1, 2, static_cast<std::uint8_t>(i)};
-                                },
-                                {10 * i, 0}));
+      const Bytes state{1, 2, static_cast<std::uint8_t>(i)};
+      ASSERT_TRUE(commit(*store, {some_frame(i), terrain, map, {}}, RunStore::Checkpoint{state, {10 * i, 0}}));
     }
-    ASSERT_TRUE(store->commit({{}, {}, some_map(4), {{"maps", 7.0, 6.0}}},
-                              [] {
-                                return Bytes{1, 2, 4};
-                              },
-                              {40, 0}, {12.5, 20}))
+    ASSERT_TRUE(commit(*store, {{}, {}, some_map(4), {{"maps", 7.0, 6.0}}},
+                       RunStore::Checkpoint{{1, 2, 4}, {40, 0}, {12.5, 20}}))
         << "the last stop";
   }
   auto store = RunStore::resume(path, kIdentity);
@@ -149,13 +153,13 @@ TEST(RunStore, ReadsCommittedRecordsBitForBit) {
 TEST(RunStore, IsResumedWithoutTheElapsedTime) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
-  const auto save = [] { return Bytes{1}; };
-  ASSERT_TRUE(RunStore::create(path, kIdentity)->commit({some_frame(0), {}, {}, {}}, save, {1, 0}, {3, 4}));
+  ASSERT_TRUE(commit(RunStore::create(path, kIdentity).value(), {some_frame(0), {}, {}, {}},
+                     RunStore::Checkpoint{{1}, {1, 0}, {3, 4}}));
   ASSERT_TRUE(Database::open(path, Database::Mode::open)->execute("DROP TABLE elapsed"));
   auto store = RunStore::resume(path, kIdentity);
   ASSERT_TRUE(store) << store.error().message();
   EXPECT_EQ((*store->checkpoint())->elapsed.wall_s, 0);
-  ASSERT_TRUE(store->commit({some_frame(1), {}, {}, {}}, save, {2, 0}, {5, 6}));
+  ASSERT_TRUE(commit(*store, {some_frame(1), {}, {}, {}}, RunStore::Checkpoint{{1}, {2, 0}, {5, 6}}));
   EXPECT_EQ((*store->checkpoint())->elapsed.wall_s, 5);
 }
 
@@ -167,11 +171,11 @@ TEST(RunStore, ResumesFromTheLatestCheckpoint) {
   {
     auto store = RunStore::create(path, kIdentity);
     ASSERT_TRUE(store) << store.error().message();
-    ASSERT_TRUE(store->commit({some_frame(0), terrain(0), {}, {}}));
+    ASSERT_TRUE(commit(*store, {some_frame(0), terrain(0), {}, {}}));
     EXPECT_FALSE(store->checkpoint().value().has_value());
-    ASSERT_TRUE(store->commit({some_frame(1), {}, some_map(0), {}}, [] { return Bytes{1}; }, {10, 0}));
-    ASSERT_TRUE(store->commit({some_frame(2), terrain(2), some_map(1), {}}));
-    ASSERT_TRUE(store->commit({some_frame(3), {}, {}, {}}));
+    ASSERT_TRUE(commit(*store, {some_frame(1), {}, some_map(0), {}}, RunStore::Checkpoint{{1}, {10, 0}}));
+    ASSERT_TRUE(commit(*store, {some_frame(2), terrain(2), some_map(1), {}}));
+    ASSERT_TRUE(commit(*store, {some_frame(3), {}, {}, {}}));
     auto reader = RunStore::open_read_only(path);
     ASSERT_TRUE(reader) << reader.error().message();
     EXPECT_EQ(reader->frames()->size(), 4U);
@@ -186,7 +190,7 @@ TEST(RunStore, ResumesFromTheLatestCheckpoint) {
   EXPECT_EQ(store->terrain()->size(), 1U);
   EXPECT_EQ(store->maps()->size(), 1U);
   EXPECT_EQ((*store->checkpoint())->source.samples_taken, 10);
-  ASSERT_TRUE(store->commit({some_frame(2), terrain(2), some_map(1), {}}));
+  ASSERT_TRUE(commit(*store, {some_frame(2), terrain(2), some_map(1), {}}));
   EXPECT_EQ(store->frames()->back().times.size(), 2U);
   EXPECT_EQ(store->frames()->back().localization->sensors.size(), 2U);
 }
@@ -194,15 +198,14 @@ TEST(RunStore, ResumesFromTheLatestCheckpoint) {
 TEST(RunStore, KeepsTheInputsOfTheLocalizationAndTheSmoothedPoses) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
-  const auto save = [] { return Bytes{1}; };
   const UncertainPose pose = some_frame(1).world_from_body;
   {
     auto store = RunStore::create(path, kIdentity);
     ASSERT_TRUE(store) << store.error().message();
-    ASSERT_TRUE(store->commit({some_frame(0), {}, {}, {}, {1, 2}}, save, {1, 0}));
-    ASSERT_TRUE(store->commit({some_frame(1), {}, {}, {}, {3}}, save, {2, 0}));
+    ASSERT_TRUE(commit(*store, {some_frame(0), {}, {}, {}, {1, 2}}, RunStore::Checkpoint{{1}, {1, 0}}));
+    ASSERT_TRUE(commit(*store, {some_frame(1), {}, {}, {}, {3}}, RunStore::Checkpoint{{1}, {2, 0}}));
     ASSERT_TRUE(store->commit_smoothed({std::nullopt, pose}));
-    ASSERT_TRUE(store->commit({{}, {}, some_map(0), {}, {4, 5, 6}}, save, {3, 0}));
+    ASSERT_TRUE(commit(*store, {{}, {}, some_map(0), {}, {4, 5, 6}}, RunStore::Checkpoint{{1}, {3, 0}}));
   }
   const auto check = [&](RunStore& store) {
     EXPECT_EQ(store.localization_inputs().value(), (std::vector<Bytes>{{1, 2}, {3}, {4, 5, 6}}));
@@ -220,7 +223,7 @@ TEST(RunStore, KeepsTheInputsOfTheLocalizationAndTheSmoothedPoses) {
   ASSERT_TRUE(store) << store.error().message();
   check(*store);
   // A run that goes on is not smoothed until its end; inputs after the checkpoint are removed with their frames.
-  ASSERT_TRUE(store->commit({some_frame(2), {}, {}, {}, {7}}));
+  ASSERT_TRUE(commit(*store, {some_frame(2), {}, {}, {}, {7}}));
   EXPECT_FALSE(store->frames()->at(1).smoothed);
   EXPECT_EQ(store->localization_inputs()->size(), 4U);
   store = RunStore::resume(path, kIdentity);
@@ -231,26 +234,27 @@ TEST(RunStore, KeepsTheInputsOfTheLocalizationAndTheSmoothedPoses) {
 TEST(RunStore, StartsAgainWithoutACheckpoint) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
-  ASSERT_TRUE(RunStore::create(path, kIdentity)->commit({some_frame(0), {}, some_map(0), {}}));
+  ASSERT_TRUE(commit(RunStore::create(path, kIdentity).value(), {some_frame(0), {}, some_map(0), {}}));
   auto store = RunStore::resume(path, kIdentity);
   ASSERT_TRUE(store) << store.error().message();
   EXPECT_TRUE(store->frames()->empty());
   EXPECT_TRUE(store->maps()->empty());
   EXPECT_FALSE(store->checkpoint().value().has_value());
-  ASSERT_TRUE(store->commit({some_frame(0), {}, some_map(0), {}}));
+  ASSERT_TRUE(commit(*store, {some_frame(0), {}, some_map(0), {}}));
 }
 
 // Version 2 had a checkpoint in every transaction and no table of counts.
 TEST(RunStore, ResumesAStoreOfVersion2AtItsLatestFrame) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
-  ASSERT_TRUE(RunStore::create(path, kIdentity)->commit({some_frame(0), {}, {}, {}}, [] { return Bytes{1}; }, {1, 0}));
+  ASSERT_TRUE(commit(RunStore::create(path, kIdentity).value(), {some_frame(0), {}, {}, {}},
+                     RunStore::Checkpoint{{1}, {1, 0}}));
   ASSERT_TRUE(Database::open(path, Database::Mode::open)->execute("DROP TABLE counts; PRAGMA user_version=2"));
   EXPECT_EQ(RunStore::open_read_only(path)->frames()->size(), 1U);
   auto store = RunStore::resume(path, kIdentity);
   ASSERT_TRUE(store) << store.error().message();
   EXPECT_EQ(store->frames()->size(), 1U);
-  ASSERT_TRUE(store->commit({some_frame(1), {}, {}, {}}));
+  ASSERT_TRUE(commit(*store, {some_frame(1), {}, {}, {}}));
 }
 
 // Counts the steps of SQLite's virtual machine in all finished statements of databases that are opened during its
@@ -283,7 +287,7 @@ void fill(const std::string& path, int doublings) {
     auto store = RunStore::create(path, kIdentity);
     ASSERT_TRUE(store) << store.error().message();
     for (int i = 0; i < 5; ++i) {
-      ASSERT_TRUE(store->commit({some_frame(i), {}, {}, {}}, [] { return Bytes{1}; }, {i, 0}));
+      ASSERT_TRUE(commit(*store, {some_frame(i), {}, {}, {}}, RunStore::Checkpoint{{1}, {i, 0}}));
     }
   }
   auto db = Database::open(path, Database::Mode::open);
@@ -379,7 +383,7 @@ TEST(RunStore, RetainsCommittedFramesWhenKilled) {
   if (child == 0) {
     auto store = RunStore::create(path, kIdentity);
     for (int i = 0; store && i < 7; ++i) {
-      if (!store->commit({some_frame(i), {}, {}, {}}, [] { return Bytes(100'000, 1); }, {i, 0})) ::_exit(1);
+      if (!commit(*store, {some_frame(i), {}, {}, {}}, RunStore::Checkpoint{Bytes(100'000, 1), {i, 0}})) ::_exit(1);
     }
     ::kill(::getpid(), SIGKILL);
   }

@@ -8,8 +8,7 @@
 #include <vector>
 
 #include "spartan/core/trajectory.h"
-#include "spartan/system/internal/terrain_files.h"
-#include "spartan/system/map_files.h"
+#include "spartan/system/run_folder.h"
 
 namespace spartan::internal {
 namespace {
@@ -17,9 +16,6 @@ namespace {
 // Length of the interval from the first IMU sample that initializes gravity if no sample comes before the first frame:
 // a recording often starts its camera and its IMU together, while the rover is stationary. Empirical.
 constexpr double kAlignmentSeconds = 1;
-// Number of frames from one checkpoint to the next; the first frame has one, too. The state of the pipeline is large
-// (some 1 MB at 1200 landmarks), and to process so many frames again after a crash takes little time.
-constexpr int kFramesPerCheckpoint = 250;
 // A live run looks so often whether it should stop.
 constexpr std::chrono::milliseconds kStopPoll{50};
 
@@ -42,11 +38,11 @@ LocalizationRecord localization_record(const LocalizationEstimate& estimate) {
 }  // namespace
 
 Status RunLoop::begin() {
-  pipeline_.store_maps_in(store_.tiles());
+  pipeline_.store_maps_in(recorder_->tiles());
   total_frames_ = recording_ ? static_cast<int>(recording_->listed_stamps(pipeline_.odometry_pair()).size()) : 0;
   if (request_.max_frames > 0)
     total_frames_ = recording_ ? std::min(total_frames_, request_.max_frames) : request_.max_frames;
-  auto checkpoint = store_.checkpoint();
+  auto checkpoint = recorder_->store().checkpoint();
   if (!checkpoint) return failure(checkpoint);
   if (!*checkpoint) {
     if (!recording_) return {};
@@ -55,18 +51,18 @@ Status RunLoop::begin() {
     pipeline_.align_with_gravity(*imu);
     return {};
   }
-  const auto frames = store_.frames();
+  const auto frames = recorder_->store().frames();
   if (!frames) return failure(frames);
   if (frames->empty()) {
     return failure(ErrorCode::store_damaged, "is damaged: it has a saved state, but table 'frames' is empty",
-                   folder_.store(), "run again into a new folder");
+                   RunFolder{request_.output}.store(), "run again into a new folder");
   }
   frames_ = static_cast<int>(frames->size());
   const Trajectory so_far = trajectory_of(*frames, TrajectoryKind::odometry);
   distance_m_ = path_length(so_far);
   if (!so_far.empty()) last_position_ = so_far.back().pose.translation();
   for (const FrameRecord& frame : *frames) usable_frames_ += frame.status != "missing";
-  if (Status status = pipeline_.restore((*checkpoint)->pipeline_state, store_.tiles()); !status) return status;
+  if (Status status = pipeline_.restore((*checkpoint)->pipeline_state, recorder_->tiles()); !status) return status;
   for (const FrameKey& key : pipeline_.pending_frames()) {
     const auto frame = recording_->frame_at(key.pair, key.left_stamp);
     if (!frame) return failure(frame);
@@ -94,9 +90,15 @@ ElapsedTime RunLoop::elapsed() const {
 }
 
 Status RunLoop::process_samples() {
-  if (Status status = process_until_end(); !status) return status;
-  if (frames_since_checkpoint_ == 0) return {};
-  return checkpoint({});
+  const Status processed = process_until_end();
+  if (processed && !complete_ && frames_ > 0) {
+    RunResult last;
+    add_checkpoint(last);
+    if (Status added = recorder_->add(std::move(last)); !added) return added;
+  }
+  // What was computed before an error is kept.
+  const Status flushed = recorder_->flush();
+  return processed ? flushed : processed;
 }
 
 Status RunLoop::process_until_end() {
@@ -125,39 +127,23 @@ Result<StreamRead> RunLoop::read() {
 // Commits what is complete only at the end of the stream: the maps of the last stops, the last terrain view and the
 // stage times since the last frame.
 Status RunLoop::finish() {
-  clock_.take();  // discards the read attempt at the end of the recording
+  clock_.take();  // discards the read attempt at the end of the stream
   complete_ = true;
-  bool any = false;
   for (;;) {
-    const auto stop = pipeline_.finish_stop();
+    auto stop = pipeline_.finish_stop();
     if (!stop) return failure(stop);
-    const std::optional<TerrainView> terrain = pipeline_.finish_terrain();
-    RunStore::Step step;
-    if (Status written = write_files(terrain, *stop, step); !written) return written;
-    step.times = take_stage_times();
-    step.localization_inputs = pipeline_.take_localization_inputs();
-    const bool last = !*stop && !terrain;
-    any = any || !last || !step.times.empty();
-    if (frames_ == 0 || !any) return {};
-    if (last) return checkpoint(step);
-    if (Status committed = store_.commit(step); !committed) return committed;
+    RunResult result;
+    result.stop = std::move(*stop);
+    result.terrain = pipeline_.finish_terrain();
+    result.x_is_east = heading_east();
+    const bool last = !result.stop && !result.terrain;
+    result.step.times = take_stage_times();
+    result.step.localization_inputs = pipeline_.take_localization_inputs();
+    if (frames_ == 0) return {};
+    if (last) add_checkpoint(result);
+    if (Status added = recorder_->add(std::move(result)); !added) return added;
+    if (last) return {};
   }
-}
-
-Status RunLoop::write_files(const std::optional<TerrainView>& terrain, const std::optional<MappedStop>& stop,
-                            RunStore::Step& step) {
-  if (terrain) {
-    auto written =
-        clock_.measure("terrain", [&] { return write_terrain(*terrain, request_.options.terrain, folder_.terrain()); });
-    if (!written) return failure(written);
-    step.terrain = *written;
-  }
-  if (stop) {
-    const auto map = write_map_of(*stop);
-    if (!map) return failure(map);
-    step.map = *map;
-  }
-  return {};
 }
 
 std::vector<StageTime> RunLoop::take_stage_times() {
@@ -165,27 +151,6 @@ std::vector<StageTime> RunLoop::take_stage_times() {
   for (const std::vector<StageTime>& measured : {clock_.take(), pipeline_.take_stage_times()})
     times.insert(times.end(), measured.begin(), measured.end());
   return times;
-}
-
-Result<MapRecord> RunLoop::write_map_of(const MappedStop& stop) {
-  const LocalMap& map = stop.merged.local;
-  const MapContext about{heading_east(), {{0, stop.stamp}}};
-  const Status written =
-      clock_.measure("maps", [&] { return write_local_map(map, about, folder_.local_map(stop.stamp)); });
-  if (!written) return failure(written);
-  MapRecord record;
-  record.stamp = stop.stamp;
-  record.position_id = stop.position_id;
-  record.views = stop.views;
-  record.prior = stop.prior;
-  record.world_from_body = stop.merged.corrected;
-  record.status = name_of(stop.merged.match.status);
-  record.overlap = stop.merged.match.overlap;
-  record.obstacles = static_cast<int>(map.obstacles.size());
-  for (int y = 0; y < map.size().height; ++y) {
-    for (int x = 0; x < map.size().width; ++x) record.known_cells += map.count(x, y) > 0 ? 1 : 0;
-  }
-  return record;
 }
 
 Status RunLoop::process(const Sample& sample) {
@@ -215,8 +180,8 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
   FrameResult& output = **result;
   if (!recording_) latencies_.add(arrived_, std::chrono::steady_clock::now(), frame.position_id >= 0);
   ++usable_frames_;
-  RunStore::Step step;
-  FrameRecord& record = step.frame.emplace();
+  RunResult recorded;
+  FrameRecord& record = recorded.step.frame.emplace();
   record.frame_id = output.frame_id;
   record.pair = output.pair;
   record.stamp = output.stamp;
@@ -231,10 +196,11 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
   if (output.motion.status == TrackingStatus::lost) {
     hooks_.log.warning(fmt::format("frame {}: odometry lost: {}", output.frame_id, output.motion.reason));
   }
-  if (Status written = write_files(output.terrain, output.stop, step); !written) return written;
+  recorded.terrain = std::move(output.terrain);
+  recorded.stop = std::move(output.stop);
   record.times = take_stage_times();
   record.times.insert(record.times.end(), output.times.begin(), output.times.end());
-  return commit(step);
+  return this->record(std::move(recorded));
 }
 
 Status RunLoop::process_missing(const MissingFrame& missing) {
@@ -248,8 +214,8 @@ Status RunLoop::process_missing(const MissingFrame& missing) {
   clock_.take();
   if (first_error_.empty()) first_error_ = missing.message;
   if (missing.pair != pipeline_.odometry_pair()) return {};
-  RunStore::Step step;
-  FrameRecord& record = step.frame.emplace();
+  RunResult recorded;
+  FrameRecord& record = recorded.step.frame.emplace();
   record.frame_id = missing.frame_id;
   record.pair = missing.pair;
   record.stamp = missing.stamp;
@@ -258,33 +224,38 @@ Status RunLoop::process_missing(const MissingFrame& missing) {
   record.message = missing.message;
   record.world_from_body.pose = pipeline_.predict(missing.stamp).value_or(Pose());
   record.times = take_stage_times();
-  return commit(step);
+  return this->record(std::move(recorded));
 }
 
-Status RunLoop::commit(RunStore::Step step) {
-  step.localization_inputs = pipeline_.take_localization_inputs();
-  if (resumed_ && !resumed_from_frame_ && step.frame) resumed_from_frame_ = step.frame->frame_id;
-  ++frames_since_checkpoint_;
-  const bool due = frames_ == 0 || frames_since_checkpoint_ >= kFramesPerCheckpoint;
-  Status status = due ? checkpoint(step) : store_.commit(step);
+Status RunLoop::record(RunResult result) {
+  result.step.localization_inputs = pipeline_.take_localization_inputs();
+  result.x_is_east = heading_east();
+  const FrameRecord& frame = *result.step.frame;
+  if (resumed_ && !resumed_from_frame_) resumed_from_frame_ = frame.frame_id;
   ++frames_;
-  if (step.frame->has_pose) {
-    const Eigen::Vector3d& position = step.frame->world_from_body.pose.translation();
+  if (frame.has_pose) {
+    const Eigen::Vector3d& position = frame.world_from_body.pose.translation();
     if (last_position_) distance_m_ += (position - *last_position_).norm();
     last_position_ = position;
   }
-  if (status && hooks_.progress) hooks_.progress({frames_, total_frames_, distance_m_, step.frame->status});
+  const RunProgress progress{frames_, total_frames_, distance_m_, frame.status};
+  const CommitOptions& options = request_.options.commit;
+  const bool far = options.every_m > 0 && distance_m_ - distance_committed_m_ >= options.every_m;
+  result.commit_now = far || (options.at_maps && result.stop);
+  if (far) distance_committed_m_ = distance_m_;
+  const std::chrono::duration<double> since = std::chrono::steady_clock::now() - last_checkpoint_;
+  if (frames_ == 1 || since.count() >= options.state_every_s) add_checkpoint(result);
+  Status status = recorder_->add(std::move(result));
+  pipeline_.map_changes_stored(recorder_->maps_stored());
+  if (status && hooks_.progress) hooks_.progress(progress);
   return status;
 }
 
-Status RunLoop::checkpoint(const RunStore::Step& step) {
-  const auto save = [&]() -> Result<Bytes> {
-    if (Status flushed = pipeline_.flush_maps(); !flushed) return failure(flushed);
-    return pipeline_.save();
-  };
-  Status status = store_.commit(step, save, {samples_taken_, recording_ ? recording_->content_hash() : 0}, elapsed());
-  if (status) frames_since_checkpoint_ = 0;
-  return status;
+void RunLoop::add_checkpoint(RunResult& result) {
+  last_checkpoint_ = std::chrono::steady_clock::now();
+  const std::uint64_t content = recording_ ? recording_->content_hash() : 0;
+  result.checkpoint = RunStore::Checkpoint{pipeline_.save(), {samples_taken_, content}, elapsed()};
+  result.maps = pipeline_.take_map_changes();
 }
 
 }  // namespace spartan::internal

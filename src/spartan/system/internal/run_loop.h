@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,6 +15,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/system/internal/latency_record.h"
+#include "spartan/system/internal/run_recorder.h"
 #include "spartan/system/pipeline.h"
 #include "spartan/system/run.h"
 #include "spartan/system/run_folder.h"
@@ -21,22 +23,21 @@
 
 namespace spartan::internal {
 
-/// Feeds the samples of a stream to the pipeline and commits every result to the store, and now and then the state
-/// of the pipeline.
+/// Feeds the samples of a stream to the pipeline and its results to the recorder, and now and then the state of the
+/// pipeline.
 class RunLoop {
  public:
   /// `recording`: the stream, where it is one that can be resumed. `start`, `start_cpu_s`: when this execution of the
   /// run began (core/stage_clock.h).
   RunLoop(const RunRequest& request, const RunHooks& hooks, SampleStream& stream, Recording* recording,
-          Pipeline pipeline, RunStore store, RunFolder folder, std::chrono::steady_clock::time_point start,
+          Pipeline pipeline, std::unique_ptr<RunRecorder> recorder, std::chrono::steady_clock::time_point start,
           double start_cpu_s)
       : request_(request),
         hooks_(hooks),
         stream_(stream),
         recording_(recording),
+        recorder_(std::move(recorder)),
         pipeline_(std::move(pipeline)),
-        store_(std::move(store)),
-        folder_(std::move(folder)),
         start_(start),
         start_cpu_s_(start_cpu_s) {}
 
@@ -57,7 +58,8 @@ class RunLoop {
   ElapsedTime elapsed() const;
   /// Of a live run.
   const LatencyRecord& latencies() const { return latencies_; }
-  RunStore& store() { return store_; }
+  RunStore& store() { return recorder_->store(); }
+  RecorderStatistics recorder_statistics() const { return recorder_->statistics(); }
   GlobalMap& global_map() { return pipeline_.global_map(); }
 
  private:
@@ -66,26 +68,21 @@ class RunLoop {
   Status seek(const RunStore::Checkpoint& checkpoint);
   Status process(const Sample& sample);
   Status finish();
-  /// Writes the files of what the back end has made, and adds their records to the step.
-  Status write_files(const std::optional<TerrainView>& terrain, const std::optional<MappedStop>& stop,
-                     RunStore::Step& step);
-  Result<MapRecord> write_map_of(const MappedStop& stop);
   /// `fault`: of the image that is missing; empty where both are there.
   Status process_frame(const StereoFrame& frame, std::string_view fault = {});
   /// Of a frame with one image, the motion is measured in it.
   Status process_missing(const MissingFrame& missing);
-  /// Commits a frame, with a checkpoint where one is due.
-  Status commit(RunStore::Step step);
-  Status checkpoint(const RunStore::Step& step);
+  /// Records a frame, with a checkpoint where one is due.
+  Status record(RunResult result);
+  void add_checkpoint(RunResult& result);
   std::vector<StageTime> take_stage_times();
 
   const RunRequest& request_;
   const RunHooks& hooks_;
   SampleStream& stream_;
   Recording* recording_;  // null: live
-  Pipeline pipeline_;
-  RunStore store_;
-  RunFolder folder_;
+  std::unique_ptr<RunRecorder> recorder_;
+  Pipeline pipeline_;  // reads map tiles through the recorder
   std::chrono::steady_clock::time_point start_;
   double start_cpu_s_;
   ElapsedTime elapsed_before_;  // this execution
@@ -96,7 +93,8 @@ class RunLoop {
   int total_frames_ = 0;               // listed frames of the odometry pair, at most max_frames
   double distance_m_ = 0;              // path length of the odometry
   std::optional<Eigen::Vector3d> last_position_;
-  int frames_since_checkpoint_ = 0;
+  std::chrono::steady_clock::time_point last_checkpoint_;
+  double distance_committed_m_ = 0;
   int usable_frames_ = 0;  // frames of the odometry pair that were processed
   std::string first_error_;
   std::chrono::steady_clock::time_point arrived_;  // of the sample that is processed

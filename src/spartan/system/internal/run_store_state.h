@@ -35,7 +35,7 @@ struct RunStore::State {
   /// Calls write() in a transaction.
   Status commit(const std::function<Status()>& write);
   Status write(const Step& step);
-  Status write_checkpoint(const Bytes& pipeline_state, const SourcePosition& source, const ElapsedTime& elapsed);
+  Status write_checkpoint(const Checkpoint& checkpoint);
   Status write(const FrameRecord& frame);
   Status write(const LocalizationRecord& localization);
   Status write(const TerrainRecord& terrain);

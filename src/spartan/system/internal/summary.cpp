@@ -31,19 +31,21 @@ Json distribution(const std::vector<double>& values) {
   return {{"median", percentile(values, 0.5)}, {"p95", percentile(values, 0.95)}, {"total", total}};
 }
 
-Json stages(const std::vector<FrameRecord>& frames) {
+Json stages(const std::vector<FrameRecord>& frames, const std::vector<StageTime>& commits) {
   struct Series {
     std::vector<double> wall, cpu;
   };
   std::vector<std::string> order;
   std::map<std::string, Series> series;
-  for (const FrameRecord& frame : frames) {
-    for (const StageTime& time : frame.times) {
+  const auto add = [&](const std::vector<StageTime>& times) {
+    for (const StageTime& time : times) {
       if (!series.contains(time.stage)) order.push_back(time.stage);
       series[time.stage].wall.push_back(time.wall_ms);
       series[time.stage].cpu.push_back(time.cpu_ms);
     }
-  }
+  };
+  for (const FrameRecord& frame : frames) add(frame.times);
+  add(commits);
   Json json = Json::object();
   for (const std::string& stage : order) {
     const Series& s = series[stage];
@@ -69,7 +71,8 @@ Json live(const std::optional<LiveFacts>& facts) {
            {{"odometry", facts->dropped.odometry},
             {"views", facts->dropped.views},
             {"sensor_samples", facts->dropped.sensor_samples}}},
-          {"queue_peak_bytes", facts->queue_peak_bytes}};
+          {"queue_peak_bytes", facts->queue_peak_bytes},
+          {"files_discarded", facts->files_discarded}};
 }
 
 // Consecutive frames without a pose.
@@ -180,7 +183,7 @@ std::string to_summary_json(const RunFacts& facts, const std::vector<FrameRecord
       {"threads", facts.threads},
       {"absent", facts.absent},
       {"live", live(facts.live)},
-      {"stages", stages(frames)},
+      {"stages", stages(frames, facts.commits)},
       {"health",
        {{"odometry", health}, {"localization", sensors}, {"wheel_slip", wheel_slip(frames, facts.slip_alarm)}}},
       {"lost_spans", spans},

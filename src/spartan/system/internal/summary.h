@@ -18,6 +18,7 @@ struct LiveFacts {
   LatencyRecord latencies;
   DroppedFrames dropped;
   std::size_t queue_peak_bytes = 0;
+  std::int64_t files_discarded = 0;  ///< terrain views and maps whose files the disk was too slow for
 };
 
 /// Facts about a run that are not in its store.
@@ -35,6 +36,7 @@ struct RunFacts {
   std::int64_t peak_memory_bytes = 0;
   /// Rows of sensor tables that were discarded: stamps that do not increase, and rows that cannot be parsed.
   std::int64_t sensor_rows_reversed = 0, sensor_rows_unreadable = 0;
+  std::vector<StageTime> commits;  ///< of this execution
   std::optional<LiveFacts> live;
   std::optional<std::int64_t> resumed_from_frame;  ///< frame_id of the first frame processed after --resume
 };

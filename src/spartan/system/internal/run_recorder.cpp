@@ -1,0 +1,180 @@
+#include "spartan/system/internal/run_recorder.h"
+
+#include <ctime>
+#include <utility>
+
+#include "spartan/system/internal/terrain_files.h"
+#include "spartan/system/map_files.h"
+
+namespace spartan::internal {
+namespace {
+
+MapRecord record_of(const MappedStop& stop) {
+  const LocalMap& map = stop.merged.local;
+  MapRecord record;
+  record.stamp = stop.stamp;
+  record.position_id = stop.position_id;
+  record.views = stop.views;
+  record.prior = stop.prior;
+  record.world_from_body = stop.merged.corrected;
+  record.status = name_of(stop.merged.match.status);
+  record.overlap = stop.merged.match.overlap;
+  record.obstacles = static_cast<int>(map.obstacles.size());
+  for (int y = 0; y < map.size().height; ++y) {
+    for (int x = 0; x < map.size().width; ++x) record.known_cells += map.count(x, y) > 0 ? 1 : 0;
+  }
+  return record;
+}
+
+std::chrono::nanoseconds seconds(double s) {
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(s * 1e9));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RunRecorder>> RunRecorder::create(RunStore store, RunFolder folder, const RunOptions& options,
+                                                         Pace pace) {
+  auto db = Database::open(folder.store(), Database::Mode::open);
+  if (!db) return failure(db);
+  auto owned = std::make_unique<Database>(std::move(*db));
+  auto tiles = TileStore::open_existing(*owned);
+  if (!tiles) return failure(tiles);
+  return std::unique_ptr<RunRecorder>(
+      new RunRecorder(std::move(store), std::move(owned), std::move(*tiles), std::move(folder), options, pace));
+}
+
+RunRecorder::RunRecorder(RunStore store, std::unique_ptr<Database> db, TileStore tiles, RunFolder folder,
+                         const RunOptions& options, Pace pace)
+    : store_(std::move(store)),
+      db_(std::move(db)),
+      tiles_(std::move(tiles)),
+      folder_(std::move(folder)),
+      terrain_options_(options.terrain),
+      options_(options.commit),
+      pace_(pace) {}
+
+RunRecorder::~RunRecorder() {
+  {
+    const Lock lock(mutex_);
+    ended_ = true;
+    changed_.notify_all();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+Status RunRecorder::add(RunResult result) {
+  Lock lock(mutex_);
+  if (!thread_.joinable()) thread_ = std::thread([this] { run(); });
+  if (pace_ == Pace::recorded) {
+    changed_.wait(lock, [this] { return !status_ || (waiting_.size() < kMostResults && files_waiting_ < kMostFiles); });
+  } else if (files_waiting_ + files_of(result) > kMostFiles) {
+    statistics_.files_discarded += static_cast<std::int64_t>(files_of(result));
+    result.terrain.reset();
+    if (result.stop) result.step.map = record_of(*result.stop);
+    result.stop.reset();
+  }
+  if (!status_) return status_;
+  files_waiting_ += files_of(result);
+  waiting_.push_back(std::move(result));
+  changed_.notify_all();
+  return {};
+}
+
+Status RunRecorder::flush() {
+  Lock lock(mutex_);
+  flushing_ = true;
+  changed_.notify_all();
+  if (thread_.joinable()) {
+    changed_.wait(lock, [this] { return !status_ || (waiting_.empty() && !busy_ && batch_.empty()); });
+  }
+  flushing_ = false;
+  return status_;
+}
+
+std::uint64_t RunRecorder::maps_stored() const {
+  const Lock lock(mutex_);
+  return maps_stored_;
+}
+
+RecorderStatistics RunRecorder::statistics() const {
+  const Lock lock(mutex_);
+  return statistics_;
+}
+
+std::chrono::steady_clock::time_point RunRecorder::commit_time() const {
+  return oldest_ + seconds(options_.every_s);
+}
+
+void RunRecorder::run() {
+  Lock lock(mutex_);
+  for (;;) {
+    const auto has_work = [this] { return ended_ || !waiting_.empty() || (flushing_ && !batch_.empty()); };
+    if (batch_.empty()) {
+      changed_.wait(lock, has_work);
+    } else {
+      changed_.wait_until(lock, commit_time(), has_work);
+    }
+    if (ended_ || !status_) return;
+    std::optional<RunResult> next;
+    if (!waiting_.empty()) {
+      next = std::move(waiting_.front());
+      waiting_.pop_front();
+      files_waiting_ -= files_of(*next);
+    }
+    busy_ = true;
+    lock.unlock();
+    Status status;
+    try {
+      status = next ? process(std::move(*next)) : commit({}, {});
+    } catch (const std::bad_alloc& exception) {
+      status = tl::unexpected(out_of_memory(exception));
+    }
+    lock.lock();
+    busy_ = false;
+    if (!status) status_ = status;
+    changed_.notify_all();
+  }
+}
+
+Status RunRecorder::process(RunResult result) {
+  if (Status written = write_files(result); !written) return written;
+  if (batch_.empty()) oldest_ = std::chrono::steady_clock::now();
+  batch_.push_back(std::move(result.step));
+  const bool due = result.checkpoint || result.commit_now || std::chrono::steady_clock::now() >= commit_time();
+  return due ? commit(result.checkpoint, result.maps) : Status();
+}
+
+Status RunRecorder::write_files(RunResult& result) {
+  StageClock clock(CLOCK_THREAD_CPUTIME_ID);
+  RunStore::Step& step = result.step;
+  if (result.terrain) {
+    auto written =
+        clock.measure("terrain", [&] { return write_terrain(*result.terrain, terrain_options_, folder_.terrain()); });
+    if (!written) return failure(written);
+    step.terrain = *written;
+  }
+  if (result.stop) {
+    const MapContext about{result.x_is_east, {{0, result.stop->stamp}}};
+    Status written = clock.measure("maps", [&] {
+      return write_local_map(result.stop->merged.local, about, folder_.local_map(result.stop->stamp));
+    });
+    if (!written) return written;
+    step.map = record_of(*result.stop);
+  }
+  std::vector<StageTime>& times = step.frame ? step.frame->times : step.times;
+  for (const StageTime& time : clock.take()) times.push_back(time);
+  return {};
+}
+
+Status RunRecorder::commit(const std::optional<RunStore::Checkpoint>& checkpoint, const MapChanges& maps) {
+  StageClock clock(CLOCK_THREAD_CPUTIME_ID);
+  Status committed = clock.measure("commit", [&] { return store_.commit(batch_, checkpoint, maps); });
+  if (!committed) return committed;
+  const Lock lock(mutex_);
+  batch_.clear();
+  if (checkpoint) maps_stored_ = maps.number;
+  statistics_.commits.push_back(clock.take().front());
+  return {};
+}
+
+}  // namespace spartan::internal

@@ -1,0 +1,104 @@
+// Writes the results of a run to its folder, on a thread of its own.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "spartan/core/result.h"
+#include "spartan/core/stage_clock.h"
+#include "spartan/storage/database.h"
+#include "spartan/system/pipeline.h"
+#include "spartan/system/run_folder.h"
+#include "spartan/system/run_options.h"
+#include "spartan/system/run_store.h"
+
+namespace spartan::internal {
+
+/// What a run has computed with one frame, or at its end.
+struct RunResult {
+  RunStore::Step step;
+  std::optional<TerrainView> terrain;  ///< its files are written and its record is added to the step
+  std::optional<MappedStop> stop;      ///< as terrain
+  bool x_is_east = false;              ///< of the world
+  bool commit_now = false;             ///< do not wait for CommitOptions::every_s
+  /// The state after this result, if the run can be resumed from here.
+  std::optional<RunStore::Checkpoint> checkpoint;
+  MapChanges maps;  ///< with a checkpoint
+};
+
+/// Results that wait for the disk, and what became of them.
+struct RecorderStatistics {
+  std::vector<StageTime> commits;    ///< of each transaction
+  std::int64_t files_discarded = 0;  ///< terrain views and local maps whose files were not written (Pace::live)
+};
+
+/// Results are committed in their order, many in one transaction (CommitOptions). Pace::recorded: add() waits where too
+/// many results wait for the disk. Pace::live: it never waits; files of terrain views and maps are then not written.
+class RunRecorder {
+ public:
+  /// Opens a second connection to the store, for reading map tiles. Codes: as Database::open().
+  static Result<std::unique_ptr<RunRecorder>> create(RunStore store, RunFolder folder, const RunOptions& options,
+                                                     Pace pace);
+  /// Results that were not committed are lost.
+  ~RunRecorder();
+  RunRecorder(const RunRecorder&) = delete;
+  RunRecorder& operator=(const RunRecorder&) = delete;
+
+  /// An error is that of an earlier result; no result after it is written. Codes: `output`, `resources`.
+  Status add(RunResult result);
+  /// Returns when all results are committed. Codes as add().
+  Status flush();
+  /// Number of the latest changes of the map that are committed.
+  std::uint64_t maps_stored() const;
+
+  /// For reading tiles while the recorder writes.
+  TileStore& tiles() { return tiles_; }
+  /// Before the first add(), and after flush() until the next.
+  RunStore& store() { return store_; }
+  RecorderStatistics statistics() const;
+
+  static constexpr std::size_t kMostFiles = 8;      ///< terrain views and maps that may wait
+  static constexpr std::size_t kMostResults = 512;  ///< results that may wait (Pace::recorded)
+
+ private:
+  using Lock = std::unique_lock<std::mutex>;
+  RunRecorder(RunStore store, std::unique_ptr<Database> db, TileStore tiles, RunFolder folder,
+              const RunOptions& options, Pace pace);
+  void run();
+  Status process(RunResult result);
+  Status write_files(RunResult& result);
+  Status commit(const std::optional<RunStore::Checkpoint>& checkpoint, const MapChanges& maps);
+  std::chrono::steady_clock::time_point commit_time() const;
+  static std::size_t files_of(const RunResult& result) { return (result.terrain ? 1U : 0U) + (result.stop ? 1U : 0U); }
+
+  RunStore store_;
+  std::unique_ptr<Database> db_;
+  TileStore tiles_;
+  RunFolder folder_;
+  TerrainOptions terrain_options_;
+  CommitOptions options_;
+  Pace pace_;
+
+  // Of the thread.
+  std::vector<RunStore::Step> batch_;
+  std::chrono::steady_clock::time_point oldest_;  // of the batch
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<RunResult> waiting_;
+  std::size_t files_waiting_ = 0;
+  bool busy_ = false, flushing_ = false, ended_ = false;
+  Status status_;
+  std::uint64_t maps_stored_ = 0;
+  RecorderStatistics statistics_;
+  std::thread thread_;
+};
+
+}  // namespace spartan::internal
