@@ -45,6 +45,11 @@ def outputs(program, source, small_runs, work):
     yield "run", output_of(program, "run", drive, "-o", work / "run", "--truth", drive)
     yield "run", json.loads((work / "run/summary.json").read_text(encoding="utf-8"))
     yield "run", output_of(program, "run", drive, "-o", work / "odometry", "--odometry-only")
+    live = [program, "run", f"replay:{drive}", "-o", work / "live", "--speed", "20", "--publish", "-", "-q"]
+    for line in subprocess.run(map(str, live), capture_output=True, text=True, timeout=600, check=True).stdout.splitlines():
+        message = json.loads(line)
+        yield f"message_{message['type']}", message
+    yield "run", json.loads((work / "live/summary.json").read_text(encoding="utf-8"))
     for align in ("se3", "sim3", "none"):
         yield "evaluate", output_of(program, "evaluate", work / "run", "--truth", drive, "--align", align)
     yield "evaluate", output_of(program, "evaluate", work / "run", "--truth", drive, "--trajectory", "odometry")

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -11,8 +12,10 @@
 #include "program/interrupt.h"
 #include "program/json.h"
 #include "program/progress.h"
+#include "program/publisher.h"
 #include "program/recording_arguments.h"
 #include "program/run_arguments.h"
+#include "program/rover_messages.h"
 #include "program/run_summary_text.h"
 #include "program/trajectory_report.h"
 #include "spartan/core/files.h"
@@ -22,6 +25,9 @@
 namespace spartan::program {
 namespace {
 
+// Of a live run: far above the time of any stage, even on one slow core.
+constexpr double kWatchdog_s = 60;
+
 struct RunArguments {
   std::string input, output, config, truth;
   RecordingArguments recording;
@@ -29,7 +35,34 @@ struct RunArguments {
   bool resume = false, odometry_only = false;
   int max_frames = 0;
   LiveOptions live;
+  std::string publish;
+  double watchdog_s = kWatchdog_s;
 };
+
+// The messages of a run; none without --publish.
+Result<std::unique_ptr<Publisher>> open_publisher(const RunArguments& arguments, const Context& context) {
+  if (arguments.publish.empty()) return nullptr;
+  if (context.json && arguments.publish == "-")
+    return failure(ErrorCode::usage, "--json and --publish - both write to standard output");
+  auto publisher = Publisher::open(arguments.publish);
+  if (publisher && (*publisher)->port() > 0)
+    context.log.info(fmt::format("messages are published at TCP port {}", (*publisher)->port()));
+  return publisher;
+}
+
+// Borrows the publisher, which may be null.
+RunHooks live_hooks(const Context& context, Progress& progress, Publisher* publisher) {
+  RunHooks hooks = run_hooks(context, progress);
+  hooks.hung = [log = context.log](const std::string& stage, double seconds) {
+    log.error(fmt::format("stage '{}' has not ended for {:.1f} s; the run ends", stage, seconds));
+    std::_Exit(kInternalFault);
+  };
+  if (publisher == nullptr) return hooks;
+  hooks.estimate = [publisher](const LocalizationEstimate& estimate) { publisher->publish(pose_message(estimate)); };
+  hooks.frame = [publisher](const FrameRecord& frame) { publisher->publish(health_message(frame)); };
+  hooks.map = [publisher](const MappedStop& stop) { publisher->publish(map_message(stop)); };
+  return hooks;
+}
 
 // Compares the run's trajectory with the truth; the summary gets the figures under "truth".
 Result<std::string> score_trajectory(const RunArguments& arguments, RunOutcome& outcome) {
@@ -102,12 +135,15 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   request.memory_bytes = memory_bound(context);
   request.max_frames = arguments.max_frames;
   request.version = SPARTAN_VERSION;
+  if (is_live_address(arguments.input)) request.watchdog_s = arguments.watchdog_s;
 
   Progress progress(context.quiet);
   if (!arguments.truth.empty()) {
     if (const auto truth = load_truth(arguments.truth); !truth) return failure(truth);
   }
-  auto outcome = run_input(arguments, request, run_hooks(context, progress));
+  auto publisher = open_publisher(arguments, context);
+  if (!publisher) return failure(publisher);
+  auto outcome = run_input(arguments, request, live_hooks(context, progress, publisher->get()));
   if (!outcome) return failure(outcome);
   std::string text = run_summary_text(outcome->summary_json, arguments.output);
   if (!arguments.truth.empty() && !outcome->interrupted) {
@@ -121,7 +157,11 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
       context.log.warning("no report was written: " + s.error().message());
   }
   if (outcome->lost && !outcome->interrupted && !live) advise(request, *outcome, context);
-  const Status printed = print(context.json ? outcome->summary_json : text);
+  if (*publisher && (*publisher)->discarded() > 0)
+    context.log.warning(fmt::format("{} messages discarded: their reader was too slow", (*publisher)->discarded()));
+  const bool messages_on_output = arguments.publish == "-";
+  const Status printed =
+      messages_on_output ? Status() : print(context.json ? outcome->summary_json : text);
   if (!printed) return failure(printed);
   if (outcome->interrupted && !live) {
     return failure(ErrorCode::interrupted, "interrupted by the user", arguments.output, "continue with --resume");
@@ -180,6 +220,15 @@ void add_run(CLI::App& app, Context& context) {
       ->check(CLI::PositiveNumber);
   command->add_option("--passes", a->live.passes, "How often a replay plays its recording (default 1).")
       ->check(CLI::PositiveNumber);
+  command->add_option(
+      "--publish", a->publish,
+      "Publish poses at the rate of the IMU, health and maps as JSON lines: to - (standard output, without the "
+      "summary), to a FIFO, to tcp:PORT of this computer, or to tcp:ADDRESS:PORT (default: nowhere).");
+  command
+      ->add_option("--watchdog", a->watchdog_s,
+                   "Of a live run: end the program, with the name of the stage, if one has not ended after so many "
+                   "seconds (default 60; 0: never).")
+      ->check(CLI::NonNegativeNumber);
   add_force_flag(*command, context)->excludes(resume);
   add_threads_option(*command, context);
   add_memory_option(*command, context);

@@ -78,12 +78,12 @@ TEST_F(Stops, EveryFrameAndStopIsTimed) {
     const auto summary = nlohmann::json::parse(testing::content_of(path(output + "/summary.json")));
     return summary["stages"][stage]["count"].get<int>();
   };
-  ASSERT_TRUE(finished(run("out")));
+  ASSERT_TRUE(finished(run("out", {"--set", "stop_delay_frames=0"})));
   for (const char* stage : {"camera", "imaging"}) EXPECT_EQ(times_run("out", stage), frames) << stage;
   for (const char* stage : {"mapping", "slam", "maps"}) EXPECT_EQ(times_run("out", stage), 2) << stage << ", two stops";
-  ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
+  ASSERT_TRUE(finished(run("part", {"--max-frames", "3", "--set", "stop_delay_frames=0"})));
   EXPECT_EQ(times_run("part", "maps"), 1) << "the second stop is not finished";
-  ASSERT_TRUE(finished(run("part", {"--resume"})));
+  ASSERT_TRUE(finished(run("part", {"--resume", "--set", "stop_delay_frames=0"})));
   EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("out")));
   ASSERT_TRUE(finished(run("no_maps", {"--set", "maps=false"})));
   EXPECT_EQ(times_run("no_maps", "camera"), frames);
@@ -195,7 +195,9 @@ TEST_F(Stops, AMapTooLargeForOneImageRemovesTheOldOne) {
 
 // A tile with a wrong checksum ends the run when it is read; that step is not committed.
 TEST_F(Stops, ADamagedTileEndsTheRun) {
-  ASSERT_TRUE(finished(run("part", {"--max-frames", "3"})));
+  const std::vector<std::string> at_once{"--set", "stop_delay_frames=0"};
+  ASSERT_TRUE(finished(run("undamaged", at_once)));
+  ASSERT_TRUE(finished(run("part", {"--max-frames", "3", "--set", "stop_delay_frames=0"})));
   const auto shift_checksums = [&](const std::string& by) {
     auto db = Database::open(path("part/run.sqlite"), Database::Mode::open);
     ASSERT_TRUE(db) << db.error().message();
@@ -203,15 +205,15 @@ TEST_F(Stops, ADamagedTileEndsTheRun) {
   };
   shift_checksums("+ 1");
   for (int i = 0; i < 2; ++i) {
-    const ProgramResult damaged = run("part", {"--resume"});
+    const ProgramResult damaged = run("part", {"--resume", "--set", "stop_delay_frames=0"});
     EXPECT_EQ(damaged.exit_code, 3) << damaged.err;
     EXPECT_NE(damaged.err.find("is damaged: checksum mismatch"), std::string::npos) << damaged.err;
     EXPECT_NE(damaged.err.find("run.sqlite"), std::string::npos) << damaged.err;
     EXPECT_EQ(damaged.err.find("skipped"), std::string::npos) << damaged.err;
   }
   shift_checksums("- 1");
-  ASSERT_TRUE(finished(run("part", {"--resume"})));
-  EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("whole"))) << "no frame was lost";
+  ASSERT_TRUE(finished(run("part", {"--resume", "--set", "stop_delay_frames=0"})));
+  EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("undamaged"))) << "no frame was lost";
 }
 
 TEST_F(Stops, ADamagedStoreEndsTheRun) {

@@ -1,6 +1,7 @@
 // Timing of pipeline stages and resource usage, for reports only; no result depends on them.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <ctime>
@@ -50,6 +51,28 @@ class Stopwatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
+/// What a thread does now, for another thread that watches it.
+class RunningStage {
+ public:
+  using Clock = std::chrono::steady_clock;
+  /// Returns the stage before, null where there was none. `stage` must be a string literal.
+  const char* begin(const char* stage) {
+    since_ = Clock::now().time_since_epoch().count();
+    return stage_.exchange(stage);
+  }
+  /// Goes on with the stage before.
+  void end(const char* before) { begin(before); }
+  /// Null where there is none.
+  const char* stage() const { return stage_; }
+  double seconds() const {
+    return std::chrono::duration<double>(Clock::now().time_since_epoch() - Clock::duration(since_)).count();
+  }
+
+ private:
+  std::atomic<const char*> stage_ = nullptr;
+  std::atomic<Clock::rep> since_ = 0;
+};
+
 /// Measures the times of consecutive stages.
 class StageClock {
  public:
@@ -57,12 +80,15 @@ class StageClock {
   /// `cpu_clock`: CLOCK_THREAD_CPUTIME_ID for stages that one thread runs beside others, instead of that of the
   /// process.
   explicit StageClock(clockid_t cpu_clock) : cpu_clock_(cpu_clock) {}
+  /// From now on the stage that is measured is the running one. Borrowed.
+  void show_in(RunningStage& running) { running_ = &running; }
 
   /// Runs `work`, records its time under the name `stage`, and returns its result. Nothing is recorded where `work`
   /// throws.
   template <class Work>
   auto measure(const char* stage, Work&& work) {
     const Lap lap = now();
+    const Shown shown(running_, stage);
     try {
       if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
         std::forward<Work>(work)();
@@ -92,6 +118,21 @@ class StageClock {
   struct Lap {
     double wall_ms, cpu_ms;
   };
+  class Shown {
+   public:
+    Shown(RunningStage* running, const char* stage) : running_(running) {
+      if (running_ != nullptr) before_ = running_->begin(stage);
+    }
+    ~Shown() {
+      if (running_ != nullptr) running_->end(before_);
+    }
+    Shown(const Shown&) = delete;
+    Shown& operator=(const Shown&) = delete;
+
+   private:
+    RunningStage* running_;
+    const char* before_ = nullptr;
+  };
   Lap now() const { return {now_ms(CLOCK_MONOTONIC), now_ms(cpu_clock_)}; }
   // Not in a destructor, which must not throw: it allocates.
   void record(const char* stage, const Lap& begin) {
@@ -100,6 +141,7 @@ class StageClock {
   }
 
   clockid_t cpu_clock_ = CLOCK_PROCESS_CPUTIME_ID;
+  RunningStage* running_ = nullptr;
   std::vector<StageTime> times_;
 };
 

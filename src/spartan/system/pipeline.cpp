@@ -307,6 +307,16 @@ FrameFault Pipeline::fault_of(const StereoFrame& frame) const {
   return frozen ? FrameFault::frozen : FrameFault::wrong_size;
 }
 
+std::optional<LocalizationEstimate> Pipeline::estimate() const {
+  if (!state_->started || state_->options.odometry_only) return std::nullopt;
+  return state_->localizer.estimate();
+}
+
+std::optional<LocalizationEstimate> Pipeline::estimate_at(Stamp stamp) const {
+  if (!state_->started || state_->options.odometry_only) return std::nullopt;
+  return state_->localizer.estimate_at(stamp);
+}
+
 std::optional<Pose> Pipeline::predict(Stamp stamp) const {
   const State& s = *state_;
   if (!s.started) return std::nullopt;
@@ -355,6 +365,12 @@ bool Pipeline::gravity_measured() const {
 }
 bool Pipeline::heading_east() const {
   return state_->localizer.estimate().heading.east;
+}
+void Pipeline::show_stages_in(RunningStage& front_end) {
+  state_->clock.show_in(front_end);
+}
+const RunningStage& Pipeline::back_end_stage() const {
+  return state_->back_end.running();
 }
 const std::string& Pipeline::odometry_pair() const {
   return state_->pair.name;

@@ -129,6 +129,12 @@ class Pipeline {
   std::vector<FrameKey> pending_frames() const;
   Status restore_frame(const StereoFrame& frame);
 
+  /// By all sensors, at the newest sample, e.g. after each one of the IMU. None before the first frame, and in a run by
+  /// odometry alone.
+  std::optional<LocalizationEstimate> estimate() const;
+  /// The same at a time between the oldest and the newest sample that the localization holds (Localizer::estimate_at).
+  std::optional<LocalizationEstimate> estimate_at(Stamp stamp) const;
+
   /// world_from_body at a time without a pose: the last pose extrapolated at constant velocity.
   std::optional<Pose> predict(Stamp stamp) const;
 
@@ -138,6 +144,11 @@ class Pipeline {
   /// Whether the world frame was initialized by measured gravity and a measured heading.
   bool gravity_measured() const;
   bool heading_east() const;
+
+  /// From now on a watchdog can see in `front_end` which stage runs. Borrowed.
+  void show_stages_in(RunningStage& front_end);
+  /// The job of the back end that runs now.
+  const RunningStage& back_end_stage() const;
 
   /// Name of the pair that drives the odometry.
   const std::string& odometry_pair() const;

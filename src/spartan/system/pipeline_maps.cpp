@@ -112,8 +112,12 @@ Result<MappedStop> Pipeline::State::finish_departed_stop() {
   if (!fused) return failure(fused);  // the stop stays the oldest one
   const StopSurvey survey = stop_stage.survey();
   StopStage::Mapped mapped = stop_stage.take_oldest();
-  clock.add(mapped.times);
-  clock.add(times.take());
+  for (const StageTime& time : times.take()) mapped.times.push_back(time);
+  // Each view is timed; the steps of the match are one stage.
+  const auto match =
+      std::stable_partition(mapped.times.begin(), mapped.times.end(), [](const StageTime& t) { return t.stage != "slam"; });
+  clock.add({mapped.times.begin(), match});
+  clock.add(sums_by_stage({match, mapped.times.end()}));
   return apply(survey, std::move(mapped.matched));
 }
 
@@ -133,7 +137,7 @@ Status Pipeline::State::start_keyframe_map() {
   if (!global) return failure(global);
   keyframe_map = map;
   map->ticket =
-      back_end.submit([this, map, excerpt = std::make_shared<const std::optional<MapExcerpt>>(std::move(*global))] {
+      back_end.submit("map of a keyframe", [this, map, excerpt = std::make_shared<const std::optional<MapExcerpt>>(std::move(*global))] {
         const auto points = map->clock.measure("mapping", [&] { return keyframe_stage.points(pair.nearest_m); });
         if (!points) {
           map->matched = failure(points);

@@ -9,7 +9,9 @@
 #include "spartan/core/files.h"
 #include "spartan/core/log.h"
 #include "spartan/core/result.h"
+#include "spartan/system/pipeline.h"
 #include "spartan/system/run_options.h"
+#include "spartan/system/run_store.h"
 
 namespace spartan {
 
@@ -25,6 +27,7 @@ struct RunRequest {
   int threads = 1;
   std::int64_t memory_bytes = 0;  ///< refuse recordings that need more, see Pipeline::check_memory(); 0: no bound
   int max_frames = 0;  ///< number of stereo frames of the odometry pair to process, missing ones included; 0: all
+  double watchdog_s = 0;  ///< see RunHooks::hung; 0: no watchdog
   std::string version;
 };
 
@@ -35,11 +38,18 @@ struct RunProgress {
   std::string status;     ///< of the last frame: FrameRecord::status
 };
 
-/// Callbacks of a run.
+/// Callbacks of a run, called by the thread that called run(). Each may be empty.
 struct RunHooks {
   Log log;
-  std::function<void(const RunProgress&)> progress;  ///< called after each frame; may be empty
-  std::function<bool()> should_stop;                 ///< called between samples; may be empty
+  std::function<void(const RunProgress&)> progress;  ///< after each frame
+  std::function<bool()> should_stop;                 ///< between samples
+  /// The localization at the newest sample: after each sample of the IMU and each frame.
+  std::function<void(const LocalizationEstimate&)> estimate;
+  std::function<void(const FrameRecord&)> frame;  ///< each frame of the odometry pair, missing ones included
+  std::function<void(const MappedStop&)> map;     ///< each map that was applied
+  /// Called once, by another thread, where a stage takes longer than RunRequest::watchdog_s: the run does not end by
+  /// itself, so this function should end the process.
+  std::function<void(const std::string& stage, double seconds)> hung;
 };
 
 struct RunOutcome {

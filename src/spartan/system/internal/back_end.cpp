@@ -19,9 +19,9 @@ void lower_priority(int by) {
 BackEnd::BackEnd(const ThreadPool& workers, bool own_thread)
     : pool_(workers), loops_(own_thread ? ThreadPool(1) : workers), own_thread_(own_thread) {}
 
-BackEnd::Ticket BackEnd::submit(std::function<void()> job) {
+BackEnd::Ticket BackEnd::submit(const char* name, std::function<void()> job) {
   const Lock lock(mutex_);
-  jobs_.push_back(std::move(job));
+  jobs_.push_back({name, std::move(job)});
   if (own_thread_ && !thread_.joinable()) thread_ = std::thread([this] { run_thread(); });
   if (!own_thread_) start_pump();
   changed_.notify_all();
@@ -40,16 +40,18 @@ std::uint64_t BackEnd::backlog() const {
 
 // With the lock, which it releases while the job runs.
 void BackEnd::run_next(Lock& lock) {
-  const std::function<void()> job = std::move(jobs_.front());
+  const Job job = std::move(jobs_.front());
   jobs_.pop_front();
   busy_ = true;
   lock.unlock();
   std::exception_ptr error;
+  running_.begin(job.name);
   try {
-    job();
+    job.work();
   } catch (...) {
     error = std::current_exception();
   }
+  running_.end(nullptr);
   lock.lock();
   busy_ = false;
   ++finished_;

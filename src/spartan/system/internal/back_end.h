@@ -9,6 +9,7 @@
 #include <mutex>
 #include <thread>
 
+#include "spartan/core/stage_clock.h"
 #include "spartan/core/threads.h"
 
 namespace spartan::internal {
@@ -29,12 +30,15 @@ class BackEnd {
   /// For the loops of the jobs.
   const ThreadPool& workers() const { return loops_; }
 
-  Ticket submit(std::function<void()> job);
+  /// `name`: a string literal, for running().
+  Ticket submit(const char* name, std::function<void()> job);
   bool is_done(Ticket ticket) const;
   /// Number of jobs that have not ended.
   std::uint64_t backlog() const;
   /// Returns when the job and all before it have ended. Rethrows what a job has thrown, at each call.
   void wait(Ticket ticket);
+  /// The job that runs now.
+  const RunningStage& running() const { return running_; }
   /// Waits for the job that has begun; the others never run.
   void stop();
 
@@ -53,7 +57,12 @@ class BackEnd {
   bool own_thread_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<std::function<void()>> jobs_;
+  struct Job {
+    const char* name;
+    std::function<void()> work;
+  };
+  std::deque<Job> jobs_;
+  RunningStage running_;
   std::uint64_t submitted_ = 0, finished_ = 0;
   bool busy_ = false, pumping_ = false, stopped_ = false;
   int waiting_ = 0;

@@ -34,7 +34,7 @@ TEST_P(BackEndTest, RunsJobsInTheirOrderOneAfterTheOther) {
   std::atomic<int> running = 0;
   BackEnd::Ticket last = 0;
   for (int i = 0; i < 200; ++i) {
-    const BackEnd::Ticket ticket = back_end_.submit([&, i] {
+    const BackEnd::Ticket ticket = back_end_.submit("job", [&, i] {
       EXPECT_EQ(++running, 1);
       order.push_back(i);
       --running;
@@ -54,7 +54,7 @@ TEST_P(BackEndTest, LoopsInsideAJobRunToTheirEnd) {
   std::atomic<int> sum = 0;
   const auto loop = [&] { back_end_.workers().parallel_for(0, 1000, 10, [&](int from, int to) { sum += to - from; }); };
   BackEnd::Ticket last = 0;
-  for (int i = 0; i < 5; ++i) last = back_end_.submit(loop);
+  for (int i = 0; i < 5; ++i) last = back_end_.submit("loop", loop);
   const ThreadPool front(GetParam().threads);
   front.parallel_for(0, 1000, 10, [&](int from, int to) { sum += to - from; });
   back_end_.wait(last);
@@ -62,7 +62,7 @@ TEST_P(BackEndTest, LoopsInsideAJobRunToTheirEnd) {
 }
 
 TEST_P(BackEndTest, RethrowsWhatAJobHasThrown) {
-  const BackEnd::Ticket thrown = back_end_.submit([] { throw std::runtime_error("no memory"); });
+  const BackEnd::Ticket thrown = back_end_.submit("job", [] { throw std::runtime_error("no memory"); });
   EXPECT_THROW(back_end_.wait(thrown), std::runtime_error);
   EXPECT_THROW(back_end_.wait(thrown), std::runtime_error);
 }
@@ -72,7 +72,7 @@ TEST_P(BackEndTest, JobsThatHaveNotBegunNeverRunAfterItsEnd) {
   {
     BackEnd back_end(ThreadPool(GetParam().threads), GetParam().own_thread);
     for (int i = 0; i < 100; ++i) {
-      back_end.submit([&] {
+      back_end.submit("job", [&] {
         std::this_thread::sleep_for(1ms);
         ++ran;
       });
@@ -91,7 +91,7 @@ TEST(BackEndThread, RunsBesideItsCallerAtALowPriority) {
   std::atomic<int> niceness = -100;
   const int own = ::getpriority(PRIO_PROCESS, 0);
   const BackEnd::Ticket ticket =
-      back_end.submit([&] { niceness = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())); });
+      back_end.submit("job", [&] { niceness = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())); });
   while (!back_end.is_done(ticket)) std::this_thread::sleep_for(1ms);  // nobody waits for it
   EXPECT_EQ(niceness, std::min(own + BackEnd::kNiceness, 19));
   EXPECT_EQ(::getpriority(PRIO_PROCESS, 0), own);

@@ -90,6 +90,12 @@ ElapsedTime RunLoop::elapsed() const {
 }
 
 Status RunLoop::process_samples() {
+  std::optional<Watchdog> watchdog;
+  if (request_.watchdog_s > 0 && hooks_.hung) {
+    pipeline_.show_stages_in(front_end_);
+    const std::vector<const RunningStage*> watched{&front_end_, &pipeline_.back_end_stage(), &recorder_->running()};
+    watchdog.emplace(watched, request_.watchdog_s, hooks_.hung);
+  }
   const Status processed = process_until_end();
   if (processed && !complete_ && frames_ > 0) {
     RunResult last;
@@ -113,7 +119,10 @@ Status RunLoop::process_until_end() {
     if (read->state == StreamRead::State::none_yet) continue;
     ++samples_taken_;
     arrived_ = read->arrived;
-    if (Status status = process(*read->sample); !status) return status;
+    front_end_.begin("front end");
+    Status status = process(*read->sample);
+    front_end_.end(nullptr);
+    if (!status) return status;
   }
   return {};
 }
@@ -136,6 +145,7 @@ Status RunLoop::finish() {
     result.stop = std::move(*stop);
     result.terrain = pipeline_.finish_terrain();
     result.x_is_east = heading_east();
+    if (hooks_.map && result.stop) hooks_.map(*result.stop);
     const bool last = !result.stop && !result.terrain;
     result.step.times = take_stage_times();
     result.step.localization_inputs = pipeline_.take_localization_inputs();
@@ -157,7 +167,10 @@ Status RunLoop::process(const Sample& sample) {
   if (const auto* frame = std::get_if<StereoFrame>(&sample)) return process_frame(*frame);
   if (const auto* missing = std::get_if<MissingFrame>(&sample)) return process_missing(*missing);
   clock_.take();  // the summary does not list the time of reading sensor samples
-  if (const auto* imu = std::get_if<ImuSample>(&sample)) pipeline_.add(*imu);
+  if (const auto* imu = std::get_if<ImuSample>(&sample)) {
+    pipeline_.add(*imu);
+    report_estimate();
+  }
   if (const auto* wheels = std::get_if<WheelSample>(&sample)) pipeline_.add(*wheels);
   if (const auto* compass = std::get_if<CompassSample>(&sample)) pipeline_.add(*compass);
   if (const auto* inclinometer = std::get_if<InclinometerSample>(&sample)) pipeline_.add(*inclinometer);
@@ -231,6 +244,9 @@ Status RunLoop::record(RunResult result) {
   result.step.localization_inputs = pipeline_.take_localization_inputs();
   result.x_is_east = heading_east();
   const FrameRecord& frame = *result.step.frame;
+  if (hooks_.frame) hooks_.frame(frame);
+  if (hooks_.map && result.stop) hooks_.map(*result.stop);
+  report_estimate();
   if (resumed_ && !resumed_from_frame_) resumed_from_frame_ = frame.frame_id;
   ++frames_;
   if (frame.has_pose) {
@@ -249,6 +265,11 @@ Status RunLoop::record(RunResult result) {
   pipeline_.map_changes_stored(recorder_->maps_stored());
   if (status && hooks_.progress) hooks_.progress(progress);
   return status;
+}
+
+void RunLoop::report_estimate() {
+  if (!hooks_.estimate) return;
+  if (const auto estimate = pipeline_.estimate()) hooks_.estimate(*estimate);
 }
 
 void RunLoop::add_checkpoint(RunResult& result) {

@@ -16,6 +16,7 @@
 #include "spartan/core/stage_clock.h"
 #include "spartan/system/internal/latency_record.h"
 #include "spartan/system/internal/run_recorder.h"
+#include "spartan/system/internal/watchdog.h"
 #include "spartan/system/pipeline.h"
 #include "spartan/system/run.h"
 #include "spartan/system/run_folder.h"
@@ -75,6 +76,7 @@ class RunLoop {
   /// Records a frame, with a checkpoint where one is due.
   Status record(RunResult result);
   void add_checkpoint(RunResult& result);
+  void report_estimate();
   std::vector<StageTime> take_stage_times();
 
   const RunRequest& request_;
@@ -83,6 +85,7 @@ class RunLoop {
   Recording* recording_;  // null: live
   std::unique_ptr<RunRecorder> recorder_;
   Pipeline pipeline_;  // reads map tiles through the recorder
+  RunningStage front_end_;
   std::chrono::steady_clock::time_point start_;
   double start_cpu_s_;
   ElapsedTime elapsed_before_;  // this execution

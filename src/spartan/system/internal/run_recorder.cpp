@@ -146,6 +146,7 @@ Status RunRecorder::process(RunResult result) {
 
 Status RunRecorder::write_files(RunResult& result) {
   StageClock clock(CLOCK_THREAD_CPUTIME_ID);
+  clock.show_in(running_);
   RunStore::Step& step = result.step;
   if (result.terrain) {
     auto written =
@@ -168,6 +169,7 @@ Status RunRecorder::write_files(RunResult& result) {
 
 Status RunRecorder::commit(const std::optional<RunStore::Checkpoint>& checkpoint, const MapChanges& maps) {
   StageClock clock(CLOCK_THREAD_CPUTIME_ID);
+  clock.show_in(running_);
   Status committed = clock.measure("commit", [&] { return store_.commit(batch_, checkpoint, maps); });
   if (!committed) return committed;
   const Lock lock(mutex_);

@@ -63,6 +63,8 @@ class RunRecorder {
   /// Before the first add(), and after flush() until the next.
   RunStore& store() { return store_; }
   RecorderStatistics statistics() const;
+  /// What its thread does now.
+  const RunningStage& running() const { return running_; }
 
   static constexpr std::size_t kMostFiles = 8;      ///< terrain views and maps that may wait
   static constexpr std::size_t kMostResults = 512;  ///< results that may wait (Pace::recorded)
@@ -90,6 +92,7 @@ class RunRecorder {
   std::vector<RunStore::Step> batch_;
   std::chrono::steady_clock::time_point oldest_;  // of the batch
 
+  RunningStage running_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<RunResult> waiting_;

@@ -61,7 +61,7 @@ void StopStage::add_to(Stop& stop, const FrameKey& key, StoredPair images, doubl
 // The view was checked when it was added, so it can be computed.
 void StopStage::compute(const Stop& stop, StoredPair images, double nearest_m, BackEnd& back_end) {
   const Eigen::Vector3d up_in_body = stop.world_from_body.pose.rotation().conjugate() * Eigen::Vector3d::UnitZ();
-  back_end.submit([this, up_in_body, nearest_m, merged = stop.merged,
+  back_end.submit("view of a stop", [this, up_in_body, nearest_m, merged = stop.merged,
                    view = std::make_shared<const StoredPair>(std::move(images))] {
     const Status added =
         merged->clock.measure("reconstruction", [&] { return mapper_.add(view->view(), nearest_m, up_in_body); });
@@ -81,7 +81,7 @@ void StopStage::depart(BackEnd& back_end) {
 }
 
 void StopStage::merge(Stop& stop, BackEnd& back_end) {
-  stop.ticket = back_end.submit([this, merged = stop.merged] {
+  stop.ticket = back_end.submit("merging of a stop", [this, merged = stop.merged] {
     merged->clock.measure("mapping", [&] { merged->points = surface_points(mapper_.merge()); });
     mapper_.leave();
   });
@@ -91,7 +91,7 @@ void StopStage::start_match(const MapMerger& merger, std::optional<MapExcerpt> g
                             BackEnd& back_end) {
   Stop& stop = stops_.front();
   stop.match = std::make_shared<MapMergeResult>();
-  stop.ticket = back_end.submit([&merger, &back_end, merged = stop.merged, match = stop.match, stamp = stop.stamp,
+  stop.ticket = back_end.submit("map of a stop", [&merger, &back_end, merged = stop.merged, match = stop.match, stamp = stop.stamp,
                                  prior = stop.world_from_body, taken = clock.take(),
                                  excerpt = std::make_shared<const std::optional<MapExcerpt>>(std::move(global))] {
     merged->clock.add(taken);

@@ -1,0 +1,151 @@
+#include "spartan/system/internal/run_recorder.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "spartan/testing/temporary_folder.h"
+
+namespace spartan::internal {
+namespace {
+
+using namespace std::chrono_literals;
+
+RunResult frame_result(int i) {
+  RunResult result;
+  FrameRecord& frame = result.step.frame.emplace();
+  frame.frame_id = i;
+  frame.pair = "narrow";
+  frame.stamp.ns = 1'000'000'000LL * (i + 1);
+  frame.status = "tracking";
+  frame.has_pose = true;
+  return result;
+}
+
+RunResult terrain_result(int i) {
+  RunResult result = frame_result(i);
+  TerrainView& view = result.terrain.emplace();
+  view.pair = "narrow";
+  view.stamp = result.step.frame->stamp;
+  view.geometry = {{8, 6}, 8, {3.5, 2.5}, 0.1};
+  view.left = Image<std::uint8_t>(8, 6, 100);
+  view.disparity = Image<float>(8, 6, 2.0F);
+  view.sigma = Image<float>(8, 6, 0.2F);
+  return result;
+}
+
+class RunRecorderTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<RunRecorder> open(const CommitOptions& commit, Pace pace = Pace::recorded) {
+    RunOptions options;
+    options.commit = commit;
+    auto store = RunStore::create(run_.store(), {"input", "options", "rig"});
+    EXPECT_TRUE(store) << store.error().message();
+    EXPECT_TRUE(make_folder(run_.terrain()));
+    EXPECT_TRUE(make_folder(run_.maps()));
+    return RunRecorder::create(std::move(*store), run_, options, pace).value();
+  }
+  // What another process sees.
+  std::size_t committed_frames() { return RunStore::open_read_only(run_.store())->frames()->size(); }
+
+  testing::TemporaryFolder folder_;
+  RunFolder run_{folder_.path()};
+};
+
+TEST_F(RunRecorderTest, CommitsManyFramesInOneTransaction) {
+  CommitOptions rarely;
+  rarely.every_s = 3600;
+  const auto recorder = open(rarely);
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(recorder->add(frame_result(i)));
+  std::this_thread::sleep_for(100ms);
+  EXPECT_EQ(committed_frames(), 0U);
+  ASSERT_TRUE(recorder->flush());
+  EXPECT_EQ(committed_frames(), 20U);
+  EXPECT_EQ(recorder->statistics().commits.size(), 1U);
+  ASSERT_TRUE(recorder->flush()) << "nothing is left";
+  EXPECT_EQ(recorder->statistics().commits.size(), 1U);
+}
+
+TEST_F(RunRecorderTest, CommitsAfterItsTimeWithoutAnotherResult) {
+  CommitOptions soon;
+  soon.every_s = 0.05;
+  const auto recorder = open(soon);
+  ASSERT_TRUE(recorder->add(frame_result(0)));
+  for (int i = 0; i < 200 && committed_frames() == 0; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(committed_frames(), 1U);
+}
+
+TEST_F(RunRecorderTest, CommitsAtOnceWhereAResultAsksForIt) {
+  CommitOptions rarely;
+  rarely.every_s = 3600;
+  const auto recorder = open(rarely);
+  ASSERT_TRUE(recorder->add(frame_result(0)));
+  RunResult now = frame_result(1);
+  now.commit_now = true;
+  ASSERT_TRUE(recorder->add(std::move(now)));
+  for (int i = 0; i < 200 && committed_frames() == 0; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(committed_frames(), 2U) << "with what came before";
+}
+
+TEST_F(RunRecorderTest, CheckpointsReportTheChangesOfTheMapAsStored) {
+  const auto recorder = open({});
+  EXPECT_EQ(recorder->maps_stored(), 0U);
+  RunResult result = frame_result(0);
+  result.checkpoint = RunStore::Checkpoint{{1, 2, 3}, {5, 6}};
+  result.maps.number = 7;
+  ASSERT_TRUE(recorder->add(std::move(result)));
+  ASSERT_TRUE(recorder->flush());
+  EXPECT_EQ(recorder->maps_stored(), 7U);
+  EXPECT_EQ((*recorder->store().checkpoint())->pipeline_state, (Bytes{1, 2, 3}));
+}
+
+TEST_F(RunRecorderTest, WritesTheFilesOfATerrainViewAndItsRecord) {
+  const auto recorder = open({});
+  ASSERT_TRUE(recorder->add(terrain_result(0)));
+  ASSERT_TRUE(recorder->flush());
+  const auto terrain = recorder->store().terrain();
+  ASSERT_TRUE(terrain);
+  ASSERT_EQ(terrain->size(), 1U);
+  EXPECT_EQ(terrain->front().density_percent, 100);
+  EXPECT_TRUE(read_file(run_.terrain() + "/1000000000.pfm"));
+  const auto frames = recorder->store().frames();
+  ASSERT_FALSE(frames->front().times.empty());
+  EXPECT_EQ(frames->front().times.back().stage, "terrain");
+}
+
+// Live, the disk may be slower than the rover; recorded results are never discarded.
+TEST_F(RunRecorderTest, DiscardsOnlyFilesAndOnlyLive) {
+  constexpr int kResults = 60;
+  for (const Pace pace : {Pace::live, Pace::recorded}) {
+    const testing::TemporaryFolder folder;
+    run_ = RunFolder{folder.path()};
+    const auto recorder = open({}, pace);
+    for (int i = 0; i < kResults; ++i) ASSERT_TRUE(recorder->add(terrain_result(i)));
+    ASSERT_TRUE(recorder->flush());
+    EXPECT_EQ(recorder->store().frames()->size(), static_cast<std::size_t>(kResults));
+    const auto written = static_cast<std::int64_t>(recorder->store().terrain()->size());
+    EXPECT_EQ(written + recorder->statistics().files_discarded, kResults);
+    EXPECT_TRUE(pace == Pace::live || written == kResults) << written;
+  }
+}
+
+TEST_F(RunRecorderTest, ReportsAnErrorOfTheDisk) {
+  const auto recorder = open({});
+  ASSERT_TRUE(recorder->add(frame_result(0)));
+  ASSERT_TRUE(recorder->flush());
+  std::filesystem::remove_all(run_.terrain());
+  ASSERT_TRUE(recorder->add(terrain_result(1)));
+  const Status flushed = recorder->flush();
+  ASSERT_FALSE(flushed);
+  EXPECT_EQ(flushed.error().code, ErrorCode::output);
+  EXPECT_FALSE(recorder->add(frame_result(2))) << "no result after it is written";
+  EXPECT_EQ(committed_frames(), 1U);
+}
+
+}  // namespace
+}  // namespace spartan::internal

@@ -1,0 +1,150 @@
+// `spartan run` over a live stream: pace, messages, clean end, watchdog.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "run_on_small_drive.h"
+#include "spartan/core/files.h"
+
+namespace spartan {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::ProgramLimits;
+using testing::ProgramResult;
+using testing::run_in_shell;
+using testing::run_program;
+using testing::summary_of;
+
+class RunLive : public testing::RunOnSmallDrive {
+ protected:
+  // 14 frames in 6.5 s of stamps.
+  std::vector<std::string> words(const std::string& output, const std::vector<std::string>& more) const {
+    std::vector<std::string> all{"run", "replay:" + drive(), "-o", path(output)};
+    all.insert(all.end(), testing::kSmallDriveOptions.begin(), testing::kSmallDriveOptions.end());
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  ProgramResult run_live(const std::string& output, const std::vector<std::string>& more,
+                         const ProgramLimits& limits = {}) const {
+    return run_program(words(output, more), limits);
+  }
+
+  // The messages of each type. Each line must be one JSON object.
+  static std::map<std::string, std::vector<nlohmann::json>> messages_in(const std::string& text) {
+    std::map<std::string, std::vector<nlohmann::json>> messages;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+      const auto json = nlohmann::json::parse(line);
+      EXPECT_EQ(json["schema"], 1);
+      messages[json["type"]].push_back(json);
+    }
+    return messages;
+  }
+};
+
+TEST_F(RunLive, ReplayGivesTheOdometryOfTheRecording) {
+  copy_finished_run("recorded");
+  const auto begin = std::chrono::steady_clock::now();
+  const ProgramResult result = run_live("live", {"--speed", "5", "--json"});
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_GT(seconds, 6.5 / 5) << "the pace of the stamps";
+  EXPECT_EQ(read_file(path("live/trajectory_odometry.tum")).value(),
+            read_file(path("recorded/trajectory_odometry.tum")).value());
+  const auto summary = summary_of(path("live"));
+  EXPECT_EQ(summary["format"], "live");
+  EXPECT_EQ(summary["input"], "replay:" + drive());
+  EXPECT_EQ(summary["live"]["latency_ms"]["count"], 14);
+  EXPECT_EQ(summary["live"]["dropped"]["odometry"], 0);
+  EXPECT_FALSE(summary["stages"].contains("camera")) << "waiting is no stage";
+}
+
+TEST_F(RunLive, SeveralPassesGoOn) {
+  const ProgramResult result = run_live("live", {"--speed", "20", "--passes", "2", "--json"});
+  ASSERT_TRUE(result.exit_code == 0 || result.exit_code == 6) << result.err;
+  EXPECT_EQ(summary_of(path("live"))["live"]["latency_ms"]["count"], 28);
+}
+
+TEST_F(RunLive, PublishesPosesHealthAndMaps) {
+  const ProgramResult result = run_live("live", {"--speed", "10", "--publish", "-"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto messages = messages_in(result.out);
+  ASSERT_EQ(messages.at("pose").size(), 14U) << "one for each frame: there is no IMU";
+  ASSERT_EQ(messages.at("health").size(), 14U);
+  EXPECT_EQ(messages.at("health").back()["odometry"], "tracking");
+  EXPECT_EQ(messages.at("health").back()["sensors"]["vision"]["state"], "ok");
+  const auto& pose = messages.at("pose").back();
+  EXPECT_EQ(pose["stamp_ns"], 6'500'000'000);
+  EXPECT_NEAR(pose["world_from_body"]["position_m"][0], 0.52, 0.03);
+  EXPECT_GT(pose["world_from_body"]["sigma_m"][0], 0);
+  ASSERT_FALSE(messages.at("map").empty());
+  EXPECT_TRUE(read_file(path("live/" + messages.at("map").front()["file"].get<std::string>())));
+}
+
+TEST_F(RunLive, PublishesToAFifoWhoseReaderComesLater) {
+  const ProgramResult result = run_in_shell(
+      R"(mkfifo "$1" && { "$0" "${@:3}" --publish "$1" & sleep 0.3; cat "$1" > "$2"; wait $!; })", [&] {
+        std::vector<std::string> all{path("fifo"), path("messages")};
+        for (const std::string& word : words("live", {"--speed", "4", "-q"})) all.push_back(word);
+        return all;
+      }());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto messages = messages_in(read_file(path("messages")).value());
+  EXPECT_GT(messages.at("pose").size(), 5U);
+}
+
+TEST_F(RunLive, PublishesToTcpClientsOfThisComputer) {
+  const std::string port = std::to_string(20000 + ::getpid() % 20000);
+  const ProgramResult result = run_in_shell(
+      R"("$0" "${@:3}" --publish "tcp:$1" & program=$!
+         for i in $(seq 100); do sleep 0.05; if exec 3<> "/dev/tcp/127.0.0.1/$1"; then break; fi; done 2> /dev/null
+         cat <&3 > "$2"; wait $program)",
+      [&] {
+        std::vector<std::string> all{port, path("messages")};
+        for (const std::string& word : words("live", {"--speed", "4", "-q"})) all.push_back(word);
+        return all;
+      }());
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_GT(messages_in(read_file(path("messages")).value()).at("health").size(), 5U);
+}
+
+TEST_F(RunLive, RejectsWhatCannotBePublishedTo) {
+  for (const std::string target : {"/nowhere/fifo", "tcp:", "tcp:99999", "tcp:here:80"}) {
+    const ProgramResult result = run_live("live", {"--publish", target});
+    EXPECT_EQ(result.exit_code, 2) << target;
+    EXPECT_THAT(result.err, HasSubstr("use tcp:PORT")) << target;
+  }
+  EXPECT_EQ(run_live("live", {"--publish", "-", "--json"}).exit_code, 2);
+  EXPECT_EQ(run_program({"run", "replay:" + path("nowhere"), "-o", path("live")}).exit_code, 3);
+  EXPECT_EQ(run_live("live", {"--resume"}).exit_code, 2);
+}
+
+TEST_F(RunLive, ASignalEndsItCleanly) {
+  const auto begin = std::chrono::steady_clock::now();
+  ProgramLimits limits;
+  limits.interrupt_once_there = path("live/run.sqlite");
+  const ProgramResult result = run_live("live", {"--speed", "0.5", "--json"}, limits);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  ASSERT_EQ(result.exit_code, 0) << "the end of a live run; " << result.err;
+  EXPECT_LT(seconds, 6) << "of 13";
+  EXPECT_FALSE(read_file(path("live/run.sqlite-wal"))) << "the store is closed";
+  EXPECT_TRUE(read_file(path("live/trajectory_odometry.tum")));
+}
+
+TEST_F(RunLive, TheWatchdogNamesTheStageThatHangs) {
+  const ProgramResult result = run_live("live", {"--speed", "10", "--watchdog", "0.0001"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("has not ended"));
+  EXPECT_THAT(result.err, HasSubstr("stage '"));
+}
+
+}  // namespace
+}  // namespace spartan
