@@ -27,6 +27,10 @@ bool interrupted() {
   return stop_requested != 0;
 }
 
+void accept_interrupt() {
+  stop_requested = 0;
+}
+
 Status expect_not_interrupted() {
   if (interrupted()) return failure(ErrorCode::interrupted, "interrupted by the user");
   return {};

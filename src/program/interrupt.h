@@ -12,6 +12,8 @@ void listen_for_interrupts();
 bool interrupted();
 /// The same as an error, for steps that follow each other.
 Status expect_not_interrupted();
+/// For a command that users end by an interrupt: from now on it counts as not interrupted.
+void accept_interrupt();
 
 /// Ignores SIGPIPE and SIGXFSZ: a closed pipe and the limit of the file size (ulimit -f) are errors of the write.
 void ignore_write_signals();

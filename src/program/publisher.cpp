@@ -22,7 +22,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::string_view kTcp = "tcp:";
-constexpr auto kPoll = 50ms;       // how often readers that come or go are noticed
+constexpr auto kPoll = 50ms;  // how often readers that come or go are noticed
 constexpr auto kLastWrites = 500ms;
 constexpr std::size_t kChunk = 4096;  // PIPE_BUF: where poll() reports space in a pipe, so much is written at once
 constexpr int kMostReaders = 16;
@@ -78,7 +78,8 @@ Status Publisher::listen_on(const std::string& address) {
   const int yes = 1;
   socklen_t size = sizeof name;
   if (listener_ < 0 || ::setsockopt(listener_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
-      ::bind(listener_, reinterpret_cast<const sockaddr*>(&name), size) != 0 || ::listen(listener_, kMostReaders) != 0 ||
+      ::bind(listener_, reinterpret_cast<const sockaddr*>(&name), size) != 0 ||
+      ::listen(listener_, kMostReaders) != 0 ||
       ::getsockname(listener_, reinterpret_cast<sockaddr*>(&name), &size) != 0) {
     return failure(ErrorCode::output, "cannot listen: " + reason(), "tcp:" + address);
   }
@@ -169,8 +170,7 @@ void Publisher::write_pending(int timeout_ms) {
     if (ready.revents == 0) continue;
     const auto reader =
         std::find_if(readers_.begin(), readers_.end(), [&](const Reader& r) { return r.file == ready.fd; });
-    const ssize_t written =
-        ::write(reader->file, reader->pending.data(), std::min(reader->pending.size(), kChunk));
+    const ssize_t written = ::write(reader->file, reader->pending.data(), std::min(reader->pending.size(), kChunk));
     if (written >= 0) {
       reader->pending.erase(0, static_cast<std::size_t>(written));
     } else if (errno != EAGAIN && errno != EINTR) {

@@ -14,8 +14,8 @@
 #include "program/progress.h"
 #include "program/publisher.h"
 #include "program/recording_arguments.h"
-#include "program/run_arguments.h"
 #include "program/rover_messages.h"
+#include "program/run_arguments.h"
 #include "program/run_summary_text.h"
 #include "program/trajectory_report.h"
 #include "spartan/core/files.h"
@@ -152,6 +152,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
     text += "\n" + *table;
   }
   const bool live = is_live_address(arguments.input);
+  if (live) accept_interrupt();
   if (!outcome->interrupted && !live) {
     if (Status s = write_report(request, arguments.truth, context); !s)
       context.log.warning("no report was written: " + s.error().message());
@@ -160,8 +161,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   if (*publisher && (*publisher)->discarded() > 0)
     context.log.warning(fmt::format("{} messages discarded: their reader was too slow", (*publisher)->discarded()));
   const bool messages_on_output = arguments.publish == "-";
-  const Status printed =
-      messages_on_output ? Status() : print(context.json ? outcome->summary_json : text);
+  const Status printed = messages_on_output ? Status() : print(context.json ? outcome->summary_json : text);
   if (!printed) return failure(printed);
   if (outcome->interrupted && !live) {
     return failure(ErrorCode::interrupted, "interrupted by the user", arguments.output, "continue with --resume");

@@ -369,6 +369,9 @@ bool Pipeline::heading_east() const {
 void Pipeline::show_stages_in(RunningStage& front_end) {
   state_->clock.show_in(front_end);
 }
+bool Pipeline::maps_a_stop() const {
+  return state_->stop_stage.has_views() || state_->stop_stage.has_departed();
+}
 const RunningStage& Pipeline::back_end_stage() const {
   return state_->back_end.running();
 }

@@ -147,6 +147,8 @@ class Pipeline {
 
   /// From now on a watchdog can see in `front_end` which stage runs. Borrowed.
   void show_stages_in(RunningStage& front_end);
+  /// Whether views of a stop are collected or the map of one is made.
+  bool maps_a_stop() const;
   /// The job of the back end that runs now.
   const RunningStage& back_end_stage() const;
 

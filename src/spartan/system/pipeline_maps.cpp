@@ -114,8 +114,8 @@ Result<MappedStop> Pipeline::State::finish_departed_stop() {
   StopStage::Mapped mapped = stop_stage.take_oldest();
   for (const StageTime& time : times.take()) mapped.times.push_back(time);
   // Each view is timed; the steps of the match are one stage.
-  const auto match =
-      std::stable_partition(mapped.times.begin(), mapped.times.end(), [](const StageTime& t) { return t.stage != "slam"; });
+  const auto match = std::stable_partition(mapped.times.begin(), mapped.times.end(),
+                                           [](const StageTime& t) { return t.stage != "slam"; });
   clock.add({mapped.times.begin(), match});
   clock.add(sums_by_stage({match, mapped.times.end()}));
   return apply(survey, std::move(mapped.matched));
@@ -136,8 +136,9 @@ Status Pipeline::State::start_keyframe_map() {
   auto global = map->clock.measure("slam", [&] { return merger.excerpt_around(keyframe_stage.prior().pose); });
   if (!global) return failure(global);
   keyframe_map = map;
-  map->ticket =
-      back_end.submit("map of a keyframe", [this, map, excerpt = std::make_shared<const std::optional<MapExcerpt>>(std::move(*global))] {
+  map->ticket = back_end.submit(
+      "map of a keyframe",
+      [this, map, excerpt = std::make_shared<const std::optional<MapExcerpt>>(std::move(*global))] {
         const auto points = map->clock.measure("mapping", [&] { return keyframe_stage.points(pair.nearest_m); });
         if (!points) {
           map->matched = failure(points);

@@ -26,7 +26,7 @@ struct RunRequest {
   bool replace = false;  ///< replace the run in `output`, if there is one, once a frame was processed
   int threads = 1;
   std::int64_t memory_bytes = 0;  ///< refuse recordings that need more, see Pipeline::check_memory(); 0: no bound
-  int max_frames = 0;  ///< number of stereo frames of the odometry pair to process, missing ones included; 0: all
+  int max_frames = 0;     ///< number of stereo frames of the odometry pair to process, missing ones included; 0: all
   double watchdog_s = 0;  ///< see RunHooks::hung; 0: no watchdog
   std::string version;
 };

@@ -9,7 +9,7 @@ namespace spartan::internal {
 /// One value for each frame of the odometry pair, ms.
 struct LatencyRecord {
   std::vector<float> all_ms;
-  std::vector<float> at_stops_ms;  ///< those of frames at a stop
+  std::vector<float> at_stops_ms;  ///< those of frames while views of a stop were collected or its map was made
 
   using Time = std::chrono::steady_clock::time_point;
   void add(Time arrived, Time answered, bool at_stop) {

@@ -178,6 +178,7 @@ Status RunLoop::process(const Sample& sample) {
 }
 
 Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) {
+  const bool at_stop = pipeline_.maps_a_stop();
   auto result = pipeline_.add(frame);
   if (!result) {
     // A frame that does not fit the rig or repeats an image is reported, counted and skipped. Any other error ends the
@@ -191,7 +192,7 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
     return {};
   }
   FrameResult& output = **result;
-  if (!recording_) latencies_.add(arrived_, std::chrono::steady_clock::now(), frame.position_id >= 0);
+  if (!recording_) latencies_.add(arrived_, std::chrono::steady_clock::now(), at_stop);
   ++usable_frames_;
   RunResult recorded;
   FrameRecord& record = recorded.step.frame.emplace();

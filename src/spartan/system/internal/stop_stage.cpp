@@ -62,7 +62,7 @@ void StopStage::add_to(Stop& stop, const FrameKey& key, StoredPair images, doubl
 void StopStage::compute(const Stop& stop, StoredPair images, double nearest_m, BackEnd& back_end) {
   const Eigen::Vector3d up_in_body = stop.world_from_body.pose.rotation().conjugate() * Eigen::Vector3d::UnitZ();
   back_end.submit("view of a stop", [this, up_in_body, nearest_m, merged = stop.merged,
-                   view = std::make_shared<const StoredPair>(std::move(images))] {
+                                     view = std::make_shared<const StoredPair>(std::move(images))] {
     const Status added =
         merged->clock.measure("reconstruction", [&] { return mapper_.add(view->view(), nearest_m, up_in_body); });
     if (!added) throw std::logic_error("StopStage: " + added.error().message());
@@ -91,13 +91,14 @@ void StopStage::start_match(const MapMerger& merger, std::optional<MapExcerpt> g
                             BackEnd& back_end) {
   Stop& stop = stops_.front();
   stop.match = std::make_shared<MapMergeResult>();
-  stop.ticket = back_end.submit("map of a stop", [&merger, &back_end, merged = stop.merged, match = stop.match, stamp = stop.stamp,
-                                 prior = stop.world_from_body, taken = clock.take(),
-                                 excerpt = std::make_shared<const std::optional<MapExcerpt>>(std::move(global))] {
-    merged->clock.add(taken);
-    *match = merged->clock.measure(
-        "slam", [&] { return merger.match(merged->points, stamp, prior, *excerpt, back_end.workers()); });
-  });
+  stop.ticket = back_end.submit(
+      "map of a stop",
+      [&merger, &back_end, merged = stop.merged, match = stop.match, stamp = stop.stamp, prior = stop.world_from_body,
+       taken = clock.take(), excerpt = std::make_shared<const std::optional<MapExcerpt>>(std::move(global))] {
+        merged->clock.add(taken);
+        *match = merged->clock.measure(
+            "slam", [&] { return merger.match(merged->points, stamp, prior, *excerpt, back_end.workers()); });
+      });
 }
 
 StopSurvey StopStage::survey() const {

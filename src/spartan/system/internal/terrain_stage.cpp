@@ -49,7 +49,8 @@ void TerrainStage::begin(const RectifiedPair& frame, const Pose& world_from_left
 // StopMapper::check() has accepted the frame, so it can be computed.
 void TerrainStage::compute(const RectifiedPair& frame, double nearest_m, DisparityComputer& computer,
                            BackEnd& back_end) {
-  ticket_ = back_end.submit("terrain view", [&computer, job = job_, nearest_m, images = std::make_shared<const StoredPair>(frame)] {
+  ticket_ = back_end.submit("terrain view", [&computer, job = job_, nearest_m,
+                                             images = std::make_shared<const StoredPair>(frame)] {
     const RectifiedPair pair = images->view();
     const DisparityImage computed = job->clock.measure("reconstruction", [&] {
       return computer
