@@ -47,6 +47,7 @@ struct MappedStop {
   int views = 0;
   UncertainPose prior;    ///< world_from_body before map matching
   MapMergeResult merged;  ///< match, corrected pose, and the local map at that pose
+  double seconds = 0;     ///< from leaving the stop, or from the keyframe, to its application; for reports only
 };
 
 /// Result of one frame of the odometry pair. `slam`, `localization`, `terrain` and `stop` are empty in a run by

@@ -118,7 +118,9 @@ Result<MappedStop> Pipeline::State::finish_departed_stop() {
                                            [](const StageTime& t) { return t.stage != "slam"; });
   clock.add({mapped.times.begin(), match});
   clock.add(sums_by_stage({match, mapped.times.end()}));
-  return apply(survey, std::move(mapped.matched));
+  MappedStop stop = apply(survey, std::move(mapped.matched));
+  stop.seconds = mapped.seconds;
+  return stop;
 }
 
 Result<std::optional<MappedStop>> Pipeline::State::finish_stop() {
@@ -166,7 +168,7 @@ Result<MappedStop> Pipeline::State::finish_keyframe() {
 
 MappedStop Pipeline::State::apply(const StopSurvey& survey, MapMergeResult merged) {
   if (merged.constraint) apply_map_constraint(survey, *merged.constraint);
-  return {survey.position_id, survey.stamp, survey.views, survey.world_from_body, std::move(merged)};
+  return {survey.position_id, survey.stamp, survey.views, survey.world_from_body, std::move(merged), 0};
 }
 
 // A frame whose motion is unknown or of which an image is missing is no keyframe.

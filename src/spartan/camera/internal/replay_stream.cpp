@@ -1,10 +1,16 @@
 #include "spartan/camera/internal/replay_stream.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <new>
 #include <stdexcept>
 #include <thread>
 #include <utility>
 #include <variant>
+
+#include "spartan/core/stage_clock.h"
 
 namespace spartan::internal {
 namespace {
@@ -13,6 +19,13 @@ using std::chrono::nanoseconds;
 
 // From the last sample of a pass to the first one of the next where the recording tells no interval.
 constexpr double kPause_s = 0.1;
+
+// Of the thread that decodes, to that of the process.
+constexpr int kNiceness = 10;
+
+bool is_image(const Sample& sample) {
+  return std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);
+}
 
 nanoseconds scaled(double seconds, double speed) {
   return nanoseconds(static_cast<std::int64_t>(seconds / speed * 1e9));
@@ -34,53 +47,91 @@ ReplayStream::ReplayStream(std::unique_ptr<Recording> recording, double speed, i
   info_.path = "replay:" + info_.path;
 }
 
+ReplayStream::~ReplayStream() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
 ReplayClock::Time ReplayStream::due(Stamp stamp) const {
-  return *start_ + scaled(seconds_between(*first_stamp_, stamp), speed_);
+  return *start_ + scaled(seconds_between(*start_stamp_, stamp), speed_);
 }
 
 Result<StreamRead> ReplayStream::read(nanoseconds timeout) {
   const ReplayClock::Time called = clock_.now();
-  if (!next_ && !ended_) {
-    if (Status fetched = fetch(); !fetched) return failure(fetched);
-  }
-  if (!next_) return StreamRead{StreamRead::State::end, {}, clock_.now()};
-  const Stamp stamp = stamp_of(*next_);
+  std::unique_lock lock(mutex_);
+  if (!thread_.joinable()) thread_ = std::thread([this] { read_ahead(); });
+  changed_.wait(lock, [this] { return !ahead_.empty() || ended_; });
+  if (ahead_.empty() && !status_) return failure(status_);
+  if (ahead_.empty()) return StreamRead{StreamRead::State::end, {}, clock_.now()};
+  const Stamp stamp = stamp_of(ahead_.front());
   if (!start_) {
     start_ = clock_.now();
-    first_stamp_ = stamp;
+    start_stamp_ = stamp;
   }
   const ReplayClock::Time when = due(stamp), now = clock_.now();
   if (when > now && when > called + timeout) {
+    lock.unlock();
     clock_.wait_until(called + timeout);
     return StreamRead{StreamRead::State::none_yet, {}, clock_.now()};
   }
+  Sample sample = std::move(ahead_.front());
+  ahead_.pop_front();
+  if (is_image(sample)) --frames_ahead_;
+  lock.unlock();
+  changed_.notify_all();
   if (when > now) clock_.wait_until(when);
-  return StreamRead{StreamRead::State::sample, std::exchange(next_, std::nullopt), std::max(when, now)};
+  return StreamRead{StreamRead::State::sample, std::move(sample), std::max(when, now)};
 }
 
-Status ReplayStream::fetch() {
+void ReplayStream::read_ahead() {
+  const auto thread = static_cast<id_t>(::gettid());
+  static_cast<void>(::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + kNiceness));
+  for (;;) {
+    Result<std::optional<Sample>> sample;
+    try {
+      sample = fetch();
+    } catch (const std::bad_alloc& exception) {
+      sample = tl::unexpected(out_of_memory(exception));
+    }
+    std::unique_lock lock(mutex_);
+    if (sample && *sample) {
+      frames_ahead_ += is_image(**sample) ? 1 : 0;
+      ahead_.push_back(std::move(**sample));
+    } else {
+      ended_ = true;
+      if (!sample) status_ = failure(sample);
+    }
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return stopped_ || ended_ || has_room(); });
+    if (stopped_ || ended_) return;
+  }
+}
+
+// The next sample, shifted; none at the end.
+Result<std::optional<Sample>> ReplayStream::fetch() {
   auto sample = recording_->next();
-  if (!sample) return failure(sample);
+  if (!sample) return sample;
   if (!*sample && passes_left_ > 1 && first_stamp_) {
     --passes_left_;
-    if (Status again = recording_->seek(0); !again) return again;
+    if (Status again = recording_->seek(0); !again) return failure(again);
     const double step_s = recording_->info().sequence.median_step_s;
     const Stamp begin{last_.stamp.ns + Stamp::from_seconds(step_s > 0 ? step_s : kPause_s).ns};
-    sample = recording_->next();
-    if (!sample) return failure(sample);
     offset_ = last_;
     offset_.stamp = Stamp{begin.ns - first_stamp_->ns};
     offset_.frame_id = last_.frame_id + 1;
     offset_.position_id = last_.position_id + 1;
+    sample = recording_->next();
+    if (!sample) return sample;
   }
-  if (!*sample) {
-    ended_ = true;
-    return {};
-  }
+  if (!*sample) return std::nullopt;
+  if (!first_stamp_) first_stamp_ = stamp_of(**sample);
   shift(**sample);
   note(**sample);
-  next_ = std::move(**sample);
-  return {};
+  return sample;
 }
 
 void ReplayStream::shift(Sample& sample) const {

@@ -2,11 +2,16 @@
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "spartan/camera/recording.h"
 #include "spartan/camera/sample_stream.h"
@@ -23,21 +28,30 @@ struct ReplayClock {
 };
 
 /// The first sample arrives with the first call of read(), each other one as much later as its stamp says, divided by
-/// `speed`. An image is decoded while its time has not come. A sample that could not be read in time arrives when it is
-/// read. After the last sample the recording begins again, `passes` times in all: stamps, frame ids, stops and the
+/// `speed`. A thread of low priority reads and decodes up to kAhead samples before their time has come, so that decoding,
+/// which a camera does not need, hardly disturbs what is measured. A sample that could not be read in time arrives when
+/// it is read. After the last sample the recording begins again, `passes` times in all: stamps, frame ids, stops and the
 /// distances of the wheels go on.
 class ReplayStream : public SampleStream {
  public:
   /// `speed` > 0, `passes` ≥ 1.
   ReplayStream(std::unique_ptr<Recording> recording, double speed, int passes, ReplayClock clock = ReplayClock::real());
+  ~ReplayStream() override;
+  ReplayStream(const ReplayStream&) = delete;
+  ReplayStream& operator=(const ReplayStream&) = delete;
 
   const StreamInfo& info() const override { return info_; }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
+  /// Only after the end.
   DiscardedSamples discarded() const override { return recording_->discarded(); }
+  /// Only before the first call of read().
   std::size_t previews(const std::string& pair) const override { return recording_->previews(pair); }
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
     return recording_->preview(pair, index);
   }
+
+  static constexpr std::size_t kAhead = 64;        ///< samples
+  static constexpr std::size_t kFramesAhead = 12;  ///< of those
 
  private:
   // What is added to the samples of a pass, and how far the samples have come.
@@ -47,7 +61,9 @@ class ReplayStream : public SampleStream {
     double left_m = 0, right_m = 0;
   };
 
-  Status fetch();
+  void read_ahead();
+  Result<std::optional<Sample>> fetch();
+  bool has_room() const { return ahead_.size() < kAhead && frames_ahead_ < kFramesAhead; }
   void shift(Sample& sample) const;
   void note(const Sample& sample);
   ReplayClock::Time due(Stamp stamp) const;
@@ -57,11 +73,20 @@ class ReplayStream : public SampleStream {
   double speed_;
   int passes_left_;
   ReplayClock clock_;
-  std::optional<Sample> next_;
-  bool ended_ = false;
   std::optional<ReplayClock::Time> start_;
+  std::optional<Stamp> start_stamp_;
+
+  // Of the thread.
   std::optional<Stamp> first_stamp_;  // of the recording
   Progress offset_, last_;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Sample> ahead_;
+  std::size_t frames_ahead_ = 0;
+  bool stopped_ = false, ended_ = false;
+  Status status_;  // why it has ended
+  std::thread thread_;
 };
 
 }  // namespace spartan::internal

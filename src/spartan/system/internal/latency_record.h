@@ -11,6 +11,8 @@ struct LatencyRecord {
   std::vector<float> all_ms;
   std::vector<float> at_stops_ms;  ///< those of frames while views of a stop were collected or its map was made
 
+  std::vector<float> maps_ms;  ///< from leaving a stop to its map in the global map
+
   using Time = std::chrono::steady_clock::time_point;
   void add(Time arrived, Time answered, bool at_stop) {
     const float ms = std::chrono::duration<float, std::milli>(answered - arrived).count();

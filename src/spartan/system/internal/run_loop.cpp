@@ -210,6 +210,8 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
   if (output.motion.status == TrackingStatus::lost) {
     hooks_.log.warning(fmt::format("frame {}: odometry lost: {}", output.frame_id, output.motion.reason));
   }
+  if (!recording_ && output.stop && output.stop->position_id >= 0)
+    latencies_.maps_ms.push_back(static_cast<float>(1e3 * output.stop->seconds));
   recorded.terrain = std::move(output.terrain);
   recorded.stop = std::move(output.stop);
   record.times = take_stage_times();

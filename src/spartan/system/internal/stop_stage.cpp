@@ -77,6 +77,7 @@ void StopStage::depart(BackEnd& back_end) {
     return;
   }
   stop.departed = true;
+  stop.departure = std::chrono::steady_clock::now();
   if (stop.ticket == 0) merge(stop, back_end);
 }
 
@@ -113,7 +114,8 @@ StopSurvey StopStage::survey() const {
 
 StopStage::Mapped StopStage::take_oldest() {
   const Stop& stop = stops_.front();
-  Mapped mapped{std::move(*stop.match), stop.merged->clock.take()};
+  const std::chrono::duration<double> since = std::chrono::steady_clock::now() - stop.departure;
+  Mapped mapped{std::move(*stop.match), stop.merged->clock.take(), since.count()};
   stops_.pop_front();
   return mapped;
 }

@@ -2,6 +2,7 @@
 // it.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -84,6 +85,7 @@ class StopStage {
   struct Mapped {
     MapMergeResult matched;
     std::vector<StageTime> times;
+    double seconds = 0;  ///< since the departure
   };
   Mapped take_oldest();
 
@@ -113,7 +115,8 @@ class StopStage {
     std::optional<StoredPair> first_frame;  // of the odometry pair, until there is a view
     double first_frame_nearest_m = 0;
     bool departed = false;
-    std::int32_t age = 0;  // frames since then
+    std::int32_t age = 0;                             // frames since then
+    std::chrono::steady_clock::time_point departure;  // for reports only
     std::shared_ptr<Merged> merged = std::make_shared<Merged>();
     std::shared_ptr<MapMergeResult> match;  // null: not started
     BackEnd::Ticket ticket = 0;

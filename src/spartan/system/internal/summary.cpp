@@ -67,6 +67,7 @@ Json live(const std::optional<LiveFacts>& facts) {
   if (!facts) return nullptr;
   return {{"latency_ms", latency(facts->latencies.all_ms)},
           {"latency_at_stops_ms", latency(facts->latencies.at_stops_ms)},
+          {"map_after_stop_ms", latency(facts->latencies.maps_ms)},
           {"dropped",
            {{"odometry", facts->dropped.odometry},
             {"views", facts->dropped.views},
