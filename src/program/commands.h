@@ -11,6 +11,7 @@ void add_completion(CLI::App& app, Context& context);
 void add_demo(CLI::App& app, Context& context);
 void add_stereo(CLI::App& app, Context& context);
 void add_run(CLI::App& app, Context& context);
+void add_record(CLI::App& app, Context& context);
 void add_rig(CLI::App& app, Context& context);
 void add_config(CLI::App& app, Context& context);
 void add_export(CLI::App& app, Context& context);

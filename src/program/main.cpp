@@ -34,6 +34,7 @@ LogLevel level_of(const Context& context) {
 void add_commands(CLI::App& app, Context& context) {
   add_demo(app, context);
   add_run(app, context);
+  add_record(app, context);
   add_stereo(app, context);
   add_map(app, context);
   add_features(app, context);

@@ -39,6 +39,17 @@ Result<OpenOptions> open_options(const RecordingArguments& a) {
   return open;
 }
 
+void add_recorded_images_option(CLI::App& command, std::string& value) {
+  command
+      .add_option("--record-images", value,
+                  "Files of recorded images: pnm (default) is fast to write, png half as large; both are lossless.")
+      ->check(CLI::IsMember({"pnm", "png"}));
+}
+
+ImageFiles image_files_of(const std::string& value) {
+  return value == "png" ? ImageFiles::png : ImageFiles::pnm;
+}
+
 void log_remarks(const RecordingInfo& info, const Log& log) {
   for (const std::string& warning : info.sequence.warnings) log.warning(warning);
   for (const std::string& remark : info.sequence.remarks) log.info(remark);

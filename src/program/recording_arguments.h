@@ -5,6 +5,7 @@
 
 #include "program/context.h"
 #include "spartan/camera/recording.h"
+#include "spartan/camera/recording_writer.h"
 
 namespace spartan::program {
 
@@ -18,6 +19,10 @@ struct RecordingArguments {
 void add_recording_options(CLI::App& command, RecordingArguments& arguments);
 /// Code `usage` for an unknown format.
 Result<OpenOptions> open_options(const RecordingArguments& arguments);
+
+/// `--record-images png|pnm`, for commands that record a stream.
+void add_recorded_images_option(CLI::App& command, std::string& value);
+ImageFiles image_files_of(const std::string& value);
 
 /// Logs what a recording does not state and is assumed, and irregularities of its files.
 void log_remarks(const RecordingInfo& info, const Log& log);

@@ -35,7 +35,8 @@ struct RunArguments {
   bool resume = false, odometry_only = false;
   int max_frames = 0;
   LiveOptions live;
-  std::string publish;
+  std::string publish, record_images = "pnm";
+  bool no_recording = false;
   double watchdog_s = kWatchdog_s;
 };
 
@@ -136,6 +137,8 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   request.max_frames = arguments.max_frames;
   request.version = SPARTAN_VERSION;
   if (is_live_address(arguments.input)) request.watchdog_s = arguments.watchdog_s;
+  request.record = !arguments.no_recording;
+  request.recorded_images = image_files_of(arguments.record_images);
 
   Progress progress(context.quiet);
   if (!arguments.truth.empty()) {
@@ -224,6 +227,9 @@ void add_run(CLI::App& app, Context& context) {
       "--publish", a->publish,
       "Publish poses at the rate of the IMU, health and maps as JSON lines: to - (standard output, without the "
       "summary), to a FIFO, to tcp:PORT of this computer, or to tcp:ADDRESS:PORT (default: nowhere).");
+  command->add_flag("--no-recording", a->no_recording,
+                    "Of a live run: do not record the stream in the folder `recording` of the run.");
+  add_recorded_images_option(*command, a->record_images);
   command
       ->add_option("--watchdog", a->watchdog_s,
                    "Of a live run: end the program, with the name of the stage, if one has not ended after so many "

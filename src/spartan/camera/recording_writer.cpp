@@ -1,6 +1,8 @@
 #include "spartan/camera/recording_writer.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -46,6 +48,10 @@ class TableFile {
     return {};
   }
   Status flush() { return std::fflush(file_.get()) == 0 ? Status{} : fault(); }
+  Status sync() {
+    if (Status flushed = flush(); !flushed) return flushed;
+    return ::fsync(::fileno(file_.get())) == 0 ? Status{} : fault();
+  }
 
  private:
   Status fault() const {
@@ -59,10 +65,25 @@ class TableFile {
   std::unique_ptr<std::FILE, Close> file_;
 };
 
+// Without waiting for the disk.
+Status write_plain(const std::string& path, std::string_view content) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"), &std::fclose);
+  if (!file) return write_failure(path, errno);
+  std::setvbuf(file.get(), nullptr, _IONBF, 0);
+  if (std::fwrite(content.data(), 1, content.size(), file.get()) == content.size()) return {};
+  return write_failure(path, errno);
+}
+
+Status sync_file(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return write_failure(path, errno);
+  const int error = ::fsync(file) == 0 ? 0 : errno;
+  ::close(file);
+  return error == 0 ? Status() : write_failure(path, error);
+}
+
 Status write_image(const std::string& path, const FrameImage& image) {
-  const PixelFormat& format = image.format();
-  if (format.layout == PixelLayout::rgb) return write_png(path, image.as<Rgb8>());
-  return format.bits > 8 ? write_png(path, image.as<std::uint16_t>()) : write_png(path, image.as<std::uint8_t>());
+  return write_file_atomically(path, to_png(image));
 }
 
 // Why the image of one camera cannot be stored without loss; empty where it can.
@@ -137,6 +158,10 @@ struct RecordingWriter::State {
   std::map<std::string, std::string> previous_rows;  // rows of the interrupted run: left image → row
   std::map<std::string, TableFile> sensors;
   std::map<std::string, Stamp> last;  // last stamp of each pair and each sensor
+  bool batched = false;
+  ImageFiles images = ImageFiles::png;
+  std::vector<std::string> unsynced;  // paths of images
+  std::vector<std::string> unlisted;  // rows of their frames
 
   tl::unexpected<Error> reject(const std::string& who, Stamp stamp, const std::string& why) const {
     return failure(ErrorCode::input, fmt::format("{} at {} s {}", who, to_decimal_seconds(stamp), why), folder);
@@ -165,6 +190,12 @@ struct RecordingWriter::State {
     if (frame.left.format().bits != frame.right.format().bits)
       return reject(frame.pair, frame.left_stamp, "has left and right images of different bit depth");
     return {};
+  }
+
+  Status write(const std::string& path, const FrameImage& image) {
+    if (!batched) return write_image(path, image);
+    unsynced.push_back(path);
+    return write_plain(path, images == ImageFiles::pnm ? to_pnm(image) : to_png(image));
   }
 
   // Appends a row of `stamp` and the numbers; creates the table at its first row.
@@ -198,6 +229,15 @@ Result<RecordingWriter> RecordingWriter::create(const std::string& folder, const
     return failure(ErrorCode::output, "already exists and is not overwritten", folder, "choose another folder");
   }
   return open(folder, nominal_rig, options, {}, {});
+}
+
+Result<RecordingWriter> RecordingWriter::create_batched(const std::string& folder, const Rig& nominal_rig,
+                                                        const RecordingOptions& options, ImageFiles images) {
+  auto writer = create(folder, nominal_rig, options);
+  if (!writer) return writer;
+  writer->state_->batched = true;
+  writer->state_->images = images;
+  return writer;
 }
 
 Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const Rig& nominal_rig,
@@ -280,16 +320,44 @@ Result<bool> RecordingWriter::reuse_frame(const std::string& pair, Stamp left_st
 Status RecordingWriter::add(const StereoFrame& frame) {
   if (Status s = state_->check(frame); !s) return s;
   const std::string stem = fmt::format("images/{}/{}", frame.pair, frame.left_stamp.ns);
-  const std::string left = stem + "_left.png", right = stem + "_right.png";
-  if (Status s = write_image(state_->folder + "/" + left, frame.left); !s) return s;
-  if (Status s = write_image(state_->folder + "/" + right, frame.right); !s) return s;
+  const char* const extension = state_->images == ImageFiles::png ? ".png" : ".pnm";
+  const std::string left = stem + "_left" + extension, right = stem + "_right" + extension;
+  for (const auto& [path, image] : {std::pair{&left, &frame.left}, std::pair{&right, &frame.right}}) {
+    if (Status s = state_->write(state_->folder + "/" + *path, *image); !s) return s;
+  }
   state_->last[frame.pair] = frame.left_stamp;
   const std::string row =
       fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", frame.frame_id, frame.position_id, frame.pair,
                   frame.left_stamp.ns, frame.right_stamp.ns, left, right, to_degrees(frame.pan_rad),
                   to_degrees(frame.tilt_rad), frame.exposure_us, frame.gain, frame.left.format().bits);
+  if (state_->batched) {
+    state_->unlisted.push_back(row);
+    return {};
+  }
   if (Status s = state_->frames->append(row); !s) return s;
   return state_->frames->flush();
+}
+
+Status RecordingWriter::sync() {
+  State& state = *state_;
+  for (const std::string& path : state.unsynced) {
+    if (Status s = sync_file(path); !s) return s;
+  }
+  if (!state.unsynced.empty()) {
+    for (const StereoPair& pair : state.rig.pairs) {
+      if (Status s = sync_folder(state.folder + "/images/" + pair.name); !s) return s;
+    }
+  }
+  state.unsynced.clear();
+  for (const std::string& row : state.unlisted) {
+    if (Status s = state.frames->append(row); !s) return s;
+  }
+  state.unlisted.clear();
+  if (Status s = state.frames->sync(); !s) return s;
+  for (auto& [name, table] : state.sensors) {
+    if (Status s = table.sync(); !s) return s;
+  }
+  return {};
 }
 
 Status RecordingWriter::add(const ImuSample& s) {
@@ -332,10 +400,7 @@ Status RecordingWriter::write_truth_disparity(const std::string& pair, Stamp lef
 }
 
 Status RecordingWriter::finish() {
-  if (Status s = state_->frames->flush(); !s) return s;
-  for (auto& [name, table] : state_->sensors) {
-    if (Status s = table.flush(); !s) return s;
-  }
+  if (Status s = sync(); !s) return s;
   std::error_code ignored;
   fs::remove(state_->folder + kPreviousRowsFile, ignored);
   const RecordingFile file{.schema = 1, .about = state_->options};

@@ -1,10 +1,13 @@
 // Writes Spartan recordings (docs/reference/recording.md).
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
 
+#include "spartan/camera/sample_stream.h"
 #include "spartan/camera/samples.h"
 #include "spartan/core/files.h"
 #include "spartan/core/result.h"
@@ -21,11 +24,18 @@ struct RecordingOptions {
   SensorNoise noise = {};      ///< specified (nominal) sensor noise
 };
 
+/// Image files of a recording; both are lossless.
+enum class ImageFiles {
+  png,
+  pnm,  ///< PGM and PPM: twice as large, and written in a tenth of the time
+};
+
 /// Creates the folder and appends samples. Kinds of samples may be interleaved in any order; within a kind (and within
 /// the frames of a pair) stamps must strictly increase. Everything written reads back bit for bit. `add` rejects a
 /// sample with code `input`, and writes nothing of it, where its stamp does not increase, a number is not finite or an
 /// image does not match the camera in the rig. A frame is on disk when `add` returns, everything else after `finish()`.
-/// A recording without recording.yaml is unfinished.
+/// A recording without recording.yaml is unfinished. create_batched() writes for a stream that does not wait for the
+/// disk: a frame is listed, and sensor samples are on disk, after the next sync(), which comes after its images.
 class RecordingWriter {
  public:
   /// Starts a recording. `nominal_rig` is written to rig.yaml. Code `output` where the folder exists and is not empty,
@@ -33,6 +43,8 @@ class RecordingWriter {
   /// recording.yaml or a pair name is not usable as a folder name.
   static Result<RecordingWriter> create(const std::string& folder, const Rig& nominal_rig,
                                         const RecordingOptions& options);
+  static Result<RecordingWriter> create_batched(const std::string& folder, const Rig& nominal_rig,
+                                                const RecordingOptions& options, ImageFiles images);
   /// Resumes an unfinished recording that `create` started for the same rig. Frames with a complete row and both images
   /// can be reused with reuse_frame(); all other data is written again. Starts a recording where there is none.
   static Result<RecordingWriter> resume(const std::string& folder, const Rig& nominal_rig,
@@ -56,6 +68,8 @@ class RecordingWriter {
   Status write_truth_disparity(const std::string& pair, Stamp left_stamp, ImageView<const float> disparity,
                                ImageView<const std::uint8_t> mask);
 
+  /// Flushes what was added since the last call to the disk: first the images, then the rows that name them.
+  Status sync();
   /// Flushes all tables and writes recording.yaml.
   Status finish();
 
@@ -65,6 +79,41 @@ class RecordingWriter {
   static Result<RecordingWriter> open(const std::string& folder, const Rig& nominal_rig,
                                       const RecordingOptions& options, std::map<std::string, std::string> previous_rows,
                                       FolderLock lock);
+  std::unique_ptr<State> state_;
+};
+
+/// How far a StreamRecorder has come.
+struct RecorderProgress {
+  std::int64_t frames = 0, sensor_samples = 0;  ///< written
+  std::int64_t dropped = 0;                     ///< frames that did not fit into the queue: the disk was too slow
+  std::int64_t rejected = 0;                    ///< samples that a recording cannot hold, e.g. with a reversed stamp
+  Status status;                                ///< why writing has ended before finish(), e.g. a full disk
+};
+
+/// Records a stream while it is used: a thread writes the samples and syncs them every second. A slow or full disk
+/// never delays the caller.
+class StreamRecorder {
+ public:
+  /// Codes: as RecordingWriter::create().
+  static Result<std::unique_ptr<StreamRecorder>> create(const std::string& folder, const StreamInfo& info,
+                                                        ImageFiles images);
+  /// Ends like finish().
+  ~StreamRecorder();
+  StreamRecorder(const StreamRecorder&) = delete;
+  StreamRecorder& operator=(const StreamRecorder&) = delete;
+
+  /// Takes a share of the pixels. Placeholders of missing frames are not recorded.
+  void add(const Sample& sample);
+  /// Waits until everything is on disk, and finishes the recording. Codes: `output`, `resources`.
+  Status finish();
+  RecorderProgress progress() const;
+
+  /// Images that may wait to be written, bytes.
+  static constexpr std::size_t kMostBytes = std::size_t{128} << 20U;
+
+ private:
+  struct State;
+  explicit StreamRecorder(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 

@@ -154,9 +154,11 @@ RC_GTEST_PROP(RecordingWriter, ReadsBackBitForBit, ()) {
   Random random(*rc::gen::arbitrary<std::uint32_t>());
   const Rig rig = random_rig(random);
   const TemporaryFolder folder;
-  auto writer = RecordingWriter::create(
-      folder.path(), rig,
-      {"a name: #1", "it's \"quoted\"\nand long", 3.71, {{.accel_walk_m_s3_sqrt_hz = 5e-5}, {1e-6}, {2e-3, 1e-6}}});
+  const RecordingOptions about{
+      "a name: #1", "it's \"quoted\"\nand long", 3.71, {{.accel_walk_m_s3_sqrt_hz = 5e-5}, {1e-6}, {2e-3, 1e-6}}};
+  const ImageFiles images = random.below(2) == 0 ? ImageFiles::png : ImageFiles::pnm;
+  auto writer = random.below(2) == 0 ? RecordingWriter::create(folder.path(), rig, about)
+                                     : RecordingWriter::create_batched(folder.path(), rig, about, images);
   RC_ASSERT(writer.has_value());
   std::vector<Sample> written;
   Stamp stamp{static_cast<std::int64_t>(random.next()) - 2'000'000'000};
@@ -168,6 +170,7 @@ RC_GTEST_PROP(RecordingWriter, ReadsBackBitForBit, ()) {
     if (auto* frame = std::get_if<StereoFrame>(&sample)) frame->frame_id = i;
     const Status status = add(*writer, sample);
     RC_ASSERT(status.has_value());
+    if (random.below(4) == 0) RC_ASSERT(writer->sync().has_value());
     written.push_back(std::move(sample));
   }
   RC_ASSERT(writer->finish().has_value());

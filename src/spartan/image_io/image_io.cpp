@@ -132,6 +132,35 @@ Result<std::string> encode_png(ImageView<const Rgb8> image) {
   return png_of(image);
 }
 
+std::string to_png(const FrameImage& image) {
+  const bool deep = image.format().bits > 8;
+  if (image.format().layout == PixelLayout::rgb) return deep ? png_of(image.as<Rgb16>()) : png_of(image.as<Rgb8>());
+  return deep ? png_of(image.as<std::uint16_t>()) : png_of(image.as<std::uint8_t>());
+}
+
+std::string to_pnm(const FrameImage& image) {
+  const bool deep = image.format().bits > 8, rgb = image.format().layout == PixelLayout::rgb;
+  std::string file = std::string(rgb ? "P6" : "P5") + "\n" + std::to_string(image.width()) + " " +
+                     std::to_string(image.height()) + "\n" + (deep ? "65535" : "255") + "\n";
+  file.reserve(file.size() + image.bytes());
+  const auto append = [&file, &image]<class Pixel>(ImageView<const Pixel> pixels) {
+    for (int y = 0; y < image.height(); ++y) {
+      file.append(reinterpret_cast<const char*>(&pixels(0, y)),
+                  static_cast<std::size_t>(image.width()) * sizeof(Pixel));
+    }
+  };
+  const std::size_t header = file.size();
+  if (rgb) {
+    deep ? append(image.as<Rgb16>()) : append(image.as<Rgb8>());
+  } else {
+    deep ? append(image.as<std::uint16_t>()) : append(image.as<std::uint8_t>());
+  }
+  if (deep && std::endian::native == std::endian::little) {
+    for (std::size_t i = header; i + 1 < file.size(); i += 2) std::swap(file[i], file[i + 1]);
+  }
+  return file;
+}
+
 Status write_png(const std::string& path, ImageView<const std::uint8_t> image) {
   return write_file_atomically(path, png_of(image));
 }

@@ -1,4 +1,4 @@
-// Image files: reads PNG, JPEG, PGM/PPM and PFM; writes PNG and PFM.
+// Image files: reads PNG, JPEG, PGM/PPM and PFM; writes PNG, PGM/PPM and PFM.
 #pragma once
 
 #include <optional>
@@ -39,6 +39,12 @@ Status write_png(const std::string& path, ImageView<const Rgb16> image);
 /// Encodes an image as PNG in memory.
 Result<std::string> encode_png(ImageView<const std::uint8_t> image);
 Result<std::string> encode_png(ImageView<const Rgb8> image);
+
+/// The same of a camera's image, by its samples: significant bits and Bayer pattern are not stored.
+std::string to_png(const FrameImage& image);
+/// A binary PGM or PPM file of a camera's image (P5, P6; big-endian where a sample has 16 bits of storage): larger than
+/// a PNG, and encoded at the speed of copying.
+std::string to_pnm(const FrameImage& image);
 
 /// Encodes a gray image as JPEG in memory, with a quality from 1 to 100. Code `internal` if the encoder fails.
 Result<std::string> encode_jpeg(ImageView<const std::uint8_t> image, int quality);

@@ -150,8 +150,10 @@ RunFacts facts_of(const RunRequest& request, const RunSource& source, const RunO
   facts.version = request.version;
   facts.input = source.stream.info().path;
   facts.format = source.recording ? name_of(source.recording->info().format) : "live";
-  if (source.queue)
-    facts.live = LiveFacts{run_loop.latencies(), source.queue->dropped(), source.queue->peak_bytes(), 0};
+  if (source.queue) {
+    facts.live = LiveFacts{run_loop.latencies(), source.queue->dropped(), source.queue->peak_bytes(), 0, {}};
+    if (StreamRecorder* const recorder = source.queue->recorder()) facts.live->recording = recorder->progress();
+  }
   facts.gravity_measured = run_loop.gravity_measured();
   facts.heading_east = run_loop.heading_east();
   facts.slip_alarm = options.localization.wheels.slip_alarm;
@@ -176,6 +178,20 @@ void report_dropped(const QueuedStream& queue, const Log& log) {
       fmt::format("{} frames of the odometry, {} views of other pairs and {} sensor samples were dropped: they "
                   "arrived faster than they were processed",
                   dropped.odometry, dropped.views, dropped.sensor_samples));
+}
+
+// A run goes on where its stream cannot be recorded.
+void end_recording(QueuedStream& queue, const Log& log) {
+  queue.stop();
+  StreamRecorder* const recorder = queue.recorder();
+  if (recorder == nullptr) return;
+  if (const Status finished = recorder->finish(); !finished)
+    log.error("the recording ends before the run: " + finished.error().message());
+  const RecorderProgress progress = recorder->progress();
+  if (progress.dropped > 0)
+    log.warning(fmt::format("{} frames were not recorded: the disk is too slow", progress.dropped));
+  if (progress.rejected > 0)
+    log.warning(fmt::format("{} samples were not recorded: a recording cannot hold them", progress.rejected));
 }
 
 // A live stream is never the same twice.
@@ -220,12 +236,17 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   auto recorder =
       RunRecorder::create(std::move(*store), folder, options, source.recording ? Pace::recorded : Pace::live);
   if (!recorder) return failure(recorder);
+  if (source.queue && request.record) {
+    auto recorded = StreamRecorder::create(folder.recording(), info, request.recorded_images);
+    if (!recorded) return failure(recorded);
+    source.queue->record_with(std::move(*recorded));
+  }
   RunLoop run_loop(request, hooks, source.samples(), source.recording, std::move(setup->pipeline), std::move(*recorder),
                    start.time, start.cpu_s);
   if (Status s = run_loop.begin(); !s) return failure(s);
   const Status processed = run_loop.process_samples();
   if (run_loop.usable_frames() > 0) replaced->discard();
-  if (source.queue) source.queue->stop();
+  if (source.queue) end_recording(*source.queue, hooks.log);
   if (!processed) return failure(processed);
   report_sensor_rows(source.stream, hooks.log);
   if (source.queue) report_dropped(*source.queue, hooks.log);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "spartan/camera/recording.h"
+#include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
 #include "spartan/core/log.h"
 #include "spartan/core/result.h"
@@ -26,7 +27,9 @@ struct RunRequest {
   bool replace = false;  ///< replace the run in `output`, if there is one, once a frame was processed
   int threads = 1;
   std::int64_t memory_bytes = 0;  ///< refuse recordings that need more, see Pipeline::check_memory(); 0: no bound
-  int max_frames = 0;     ///< number of stereo frames of the odometry pair to process, missing ones included; 0: all
+  int max_frames = 0;   ///< number of stereo frames of the odometry pair to process, missing ones included; 0: all
+  bool record = false;  ///< run_live(): record the stream in the run folder
+  ImageFiles recorded_images = ImageFiles::pnm;
   double watchdog_s = 0;  ///< see RunHooks::hung; 0: no watchdog
   std::string version;
 };

@@ -67,7 +67,7 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
 }
 
 Result<ReplacedFolder> replace_run_folder(const RunFolder& folder) {
-  constexpr std::array<std::string_view, 14> kEntries{"run.sqlite",
+  constexpr std::array<std::string_view, 15> kEntries{"run.sqlite",
                                                       "run.sqlite-wal",
                                                       "run.sqlite-shm",
                                                       "config.yaml",
@@ -80,6 +80,7 @@ Result<ReplacedFolder> replace_run_folder(const RunFolder& folder) {
                                                       "trajectory_smoothed.tum",
                                                       "maps",
                                                       "terrain",
+                                                      "recording",
                                                       "report"};
   std::error_code error;
   if (!fs::exists(folder.store(), error)) return ReplacedFolder();  // prepare_run_folder() tells

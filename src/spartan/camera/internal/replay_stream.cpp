@@ -21,7 +21,7 @@ using std::chrono::nanoseconds;
 constexpr double kPause_s = 0.1;
 
 // Of the thread that decodes, to that of the process.
-constexpr int kNiceness = 10;
+constexpr int kNiceness = 19;
 
 bool is_image(const Sample& sample) {
   return std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);

@@ -28,10 +28,10 @@ struct ReplayClock {
 };
 
 /// The first sample arrives with the first call of read(), each other one as much later as its stamp says, divided by
-/// `speed`. A thread of low priority reads and decodes up to kAhead samples before their time has come, so that decoding,
-/// which a camera does not need, hardly disturbs what is measured. A sample that could not be read in time arrives when
-/// it is read. After the last sample the recording begins again, `passes` times in all: stamps, frame ids, stops and the
-/// distances of the wheels go on.
+/// `speed`. A thread of low priority reads and decodes up to kAhead samples before their time has come, so that
+/// decoding, which a camera does not need, hardly disturbs what is measured. A sample that could not be read in time
+/// arrives when it is read. After the last sample the recording begins again, `passes` times in all: stamps, frame ids,
+/// stops and the distances of the wheels go on.
 class ReplayStream : public SampleStream {
  public:
   /// `speed` > 0, `passes` ≥ 1.

@@ -43,7 +43,7 @@ class BackEnd {
   void stop();
 
   /// Difference of the nice value of its own thread to that of the process.
-  static constexpr int kNiceness = 10;
+  static constexpr int kNiceness = 19;
 
  private:
   using Lock = std::unique_lock<std::mutex>;

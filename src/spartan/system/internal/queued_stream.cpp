@@ -27,7 +27,9 @@ void QueuedStream::pump() {
       auto read = stream_.read(kPoll);
       if (!read) return queue_.close(failure(read));
       if (read->state == StreamRead::State::end) break;
-      if (read->state == StreamRead::State::sample) queue_.push(std::move(*read));
+      if (read->state != StreamRead::State::sample) continue;
+      if (recorder_ != nullptr) recorder_->add(*read->sample);
+      queue_.push(std::move(*read));
     }
     queue_.close({});
   } catch (const std::bad_alloc& exception) {

@@ -6,7 +6,9 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 
+#include "spartan/camera/recording_writer.h"
 #include "spartan/camera/sample_stream.h"
 #include "spartan/system/internal/sample_queue.h"
 
@@ -30,6 +32,10 @@ class QueuedStream : public SampleStream {
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
     return stream_.preview(pair, index);
   }
+  /// Records every sample as it arrives. Before the first call of read().
+  void record_with(std::unique_ptr<StreamRecorder> recorder) { recorder_ = std::move(recorder); }
+  /// Null where nothing is recorded.
+  StreamRecorder* recorder() { return recorder_.get(); }
   /// Ends the thread; the samples in the queue can still be read.
   void stop();
   DroppedFrames dropped() const { return queue_.dropped(); }
@@ -41,6 +47,7 @@ class QueuedStream : public SampleStream {
   void pump();
 
   SampleStream& stream_;
+  std::unique_ptr<StreamRecorder> recorder_;
   SampleQueue queue_;
   std::atomic<bool> stop_ = false;
   std::thread thread_;

@@ -62,6 +62,16 @@ Json latency(const std::vector<float>& values_ms) {
           {"max", percentile(values, 1)}};
 }
 
+// Null where the stream was not recorded.
+Json recording(const std::optional<RecorderProgress>& progress) {
+  if (!progress) return nullptr;
+  return {{"frames", progress->frames},
+          {"sensor_samples", progress->sensor_samples},
+          {"dropped", progress->dropped},
+          {"rejected", progress->rejected},
+          {"error", progress->status ? Json(nullptr) : Json(progress->status.error().message())}};
+}
+
 // Null of a recording.
 Json live(const std::optional<LiveFacts>& facts) {
   if (!facts) return nullptr;
@@ -73,7 +83,8 @@ Json live(const std::optional<LiveFacts>& facts) {
             {"views", facts->dropped.views},
             {"sensor_samples", facts->dropped.sensor_samples}}},
           {"queue_peak_bytes", facts->queue_peak_bytes},
-          {"files_discarded", facts->files_discarded}};
+          {"files_discarded", facts->files_discarded},
+          {"recording", recording(facts->recording)}};
 }
 
 // Consecutive frames without a pose.

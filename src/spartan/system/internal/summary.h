@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "spartan/camera/recording_writer.h"
 #include "spartan/core/time.h"
 #include "spartan/system/internal/latency_record.h"
 #include "spartan/system/internal/sample_queue.h"
@@ -18,7 +19,8 @@ struct LiveFacts {
   LatencyRecord latencies;
   DroppedFrames dropped;
   std::size_t queue_peak_bytes = 0;
-  std::int64_t files_discarded = 0;  ///< terrain views and maps whose files the disk was too slow for
+  std::int64_t files_discarded = 0;           ///< terrain views and maps whose files the disk was too slow for
+  std::optional<RecorderProgress> recording;  ///< of the stream, if it was recorded
 };
 
 /// Facts about a run that are not in its store.

@@ -1,0 +1,173 @@
+// RecordingWriter in batches, and StreamRecorder.
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "spartan/camera/recording.h"
+#include "spartan/camera/recording_writer.h"
+#include "spartan/core/files.h"
+#include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/tiny_recordings.h"
+
+namespace spartan {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::TemporaryFolder;
+using testing::tiny_image;
+using testing::tiny_rig;
+
+StereoFrame tiny_frame(int i) {
+  StereoFrame frame;
+  frame.frame_id = i;
+  frame.pair = "stereo";
+  frame.left_stamp = frame.right_stamp = Stamp{100'000'000LL * (i + 1)};
+  frame.left = FrameImage::own(tiny_image(static_cast<std::uint64_t>(2 * i)), {});
+  frame.right = FrameImage::own(tiny_image(static_cast<std::uint64_t>(2 * i + 1)), {});
+  return frame;
+}
+
+StreamInfo tiny_stream() {
+  StreamInfo info;
+  info.rig = tiny_rig();
+  info.name = "drive";
+  info.gravity_m_s2 = 3.71;
+  return info;
+}
+
+// Rows of frames.csv without its header.
+std::size_t listed_frames(const std::string& folder) {
+  const std::string table = read_file(folder + "/frames.csv").value();
+  return static_cast<std::size_t>(std::count(table.begin(), table.end(), '\n')) - 1;
+}
+
+class StreamRecorderTest : public ::testing::TestWithParam<ImageFiles> {
+ protected:
+  std::string path() const { return folder_.path() + "/recording"; }
+  TemporaryFolder folder_;
+};
+
+TEST_P(StreamRecorderTest, RecordsWhatCanBeReadBack) {
+  {
+    const auto recorder = StreamRecorder::create(path(), tiny_stream(), GetParam()).value();
+    for (int i = 0; i < 5; ++i) {
+      recorder->add(tiny_frame(i));
+      recorder->add(WheelSample{Stamp{100'000'000LL * (i + 1) + 1}, 0.1 * i, 0.2 * i});
+    }
+    recorder->add(MissingFrame{});
+    ASSERT_TRUE(recorder->finish());
+    EXPECT_EQ(recorder->progress().frames, 5);
+    EXPECT_EQ(recorder->progress().sensor_samples, 5);
+    EXPECT_EQ(recorder->progress().dropped + recorder->progress().rejected, 0);
+  }
+  const auto recording = open_recording(path()).value();
+  EXPECT_EQ(recording->info().name, "drive");
+  EXPECT_EQ(recording->info().gravity_m_s2, 3.71);
+  const auto samples = testing::collect_samples(*recording);
+  EXPECT_EQ(samples.error, "");
+  EXPECT_EQ(samples.all.size(), 10U);
+  ASSERT_EQ(samples.frames.size(), 5U);
+  for (int i = 0; i < 5; ++i) {
+    const StereoFrame expected = tiny_frame(i), &read = samples.frames[static_cast<std::size_t>(i)];
+    EXPECT_EQ(read.frame_id, i);
+    EXPECT_TRUE(testing::same_image(read.left, expected.left));
+    EXPECT_TRUE(testing::same_image(read.right, expected.right));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(ImageFiles, StreamRecorderTest, ::testing::Values(ImageFiles::png, ImageFiles::pnm),
+                         [](const auto& files) { return files.param == ImageFiles::png ? "Png" : "Pnm"; });
+
+// A frame is listed only after its images are on disk.
+TEST(BatchedRecording, ListsFramesAtTheNextSync) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/recording";
+  auto writer = RecordingWriter::create_batched(path, tiny_rig(), {}, ImageFiles::pnm).value();
+  ASSERT_TRUE(writer.add(tiny_frame(0)));
+  ASSERT_TRUE(writer.add(tiny_frame(1)));
+  EXPECT_TRUE(std::filesystem::exists(path + "/images/stereo/100000000_left.pnm"));
+  ASSERT_TRUE(writer.sync());
+  EXPECT_EQ(listed_frames(path), 2U);
+  ASSERT_TRUE(writer.add(tiny_frame(2)));
+  EXPECT_EQ(listed_frames(path), 2U);
+  ASSERT_TRUE(writer.finish());
+  EXPECT_EQ(listed_frames(path), 3U);
+}
+
+TEST(StreamRecorder, CountsWhatARecordingCannotHold) {
+  const TemporaryFolder folder;
+  const auto recorder = StreamRecorder::create(folder.path() + "/recording", tiny_stream(), ImageFiles::pnm).value();
+  recorder->add(tiny_frame(1));
+  recorder->add(tiny_frame(0));  // its stamp does not increase
+  StereoFrame other = tiny_frame(2);
+  other.pair = "no_such_pair";
+  recorder->add(other);
+  recorder->add(tiny_frame(3));
+  ASSERT_TRUE(recorder->finish());
+  EXPECT_EQ(recorder->progress().frames, 2);
+  EXPECT_EQ(recorder->progress().rejected, 2);
+}
+
+// A process of its own: the limit of the file size stands for a full disk.
+TEST(StreamRecorder, AFullDiskLeavesWhatWasWritten) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/recording";
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    auto recorder = StreamRecorder::create(path, tiny_stream(), ImageFiles::pnm).value();
+    for (int i = 0; i < 3; ++i) recorder->add(tiny_frame(i));
+    std::this_thread::sleep_for(1500ms);  // synced
+    const rlimit none{100, 100};
+    ::setrlimit(RLIMIT_FSIZE, &none);
+    for (int i = 3; i < 6; ++i) recorder->add(tiny_frame(i));
+    const Status finished = recorder->finish();
+    const bool said = !finished && finished.error().code == ErrorCode::output;
+    ::_exit(said && recorder->progress().frames == 3 ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  EXPECT_EQ(listed_frames(path), 3U);
+  EXPECT_FALSE(std::filesystem::exists(path + "/recording.yaml")) << "it is not finished";
+}
+
+// Killed at any time, every listed frame has both images.
+TEST(StreamRecorder, KilledLeavesOnlyWholeFrames) {
+  for (const int after_ms : {300, 1100, 1400}) {
+    const TemporaryFolder folder;
+    const std::string path = folder.path() + "/recording";
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const auto recorder = StreamRecorder::create(path, tiny_stream(), ImageFiles::pnm).value();
+      for (int i = 0;; ++i) {
+        recorder->add(tiny_frame(i));
+        std::this_thread::sleep_for(2ms);
+      }
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(after_ms));
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_TRUE(after_ms < 1000 || listed_frames(path) > 100U);
+    ASSERT_TRUE(write_file_atomically(path + "/recording.yaml", "schema: 1\n"));  // as a user may finish it
+    const auto recording = open_recording(path);
+    if (!recording) continue;  // nothing was listed yet
+    const auto samples = testing::collect_samples(**recording);
+    EXPECT_TRUE(samples.missing.empty()) << samples.missing.front().message;
+  }
+}
+
+}  // namespace
+}  // namespace spartan
