@@ -50,6 +50,7 @@ def outputs(program, source, small_runs, work):
         message = json.loads(line)
         yield f"message_{message['type']}", message
     yield "run", json.loads((work / "live/summary.json").read_text(encoding="utf-8"))
+    yield "record", output_of(program, "record", f"replay:{drive}", "-o", work / "recorded", "--speed", "20")
     for align in ("se3", "sim3", "none"):
         yield "evaluate", output_of(program, "evaluate", work / "run", "--truth", drive, "--align", align)
     yield "evaluate", output_of(program, "evaluate", work / "run", "--truth", drive, "--trajectory", "odometry")
