@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "run_on_small_drive.h"
@@ -126,7 +127,6 @@ TEST_F(RunLive, RejectsWhatCannotBePublishedTo) {
   }
   EXPECT_EQ(run_live("live", {"--publish", "-", "--json"}).exit_code, 2);
   EXPECT_EQ(run_program({"run", "replay:" + path("nowhere"), "-o", path("live")}).exit_code, 3);
-  EXPECT_EQ(run_live("live", {"--resume"}).exit_code, 2);
 }
 
 TEST_F(RunLive, ASignalEndsItCleanly) {
@@ -139,6 +139,34 @@ TEST_F(RunLive, ASignalEndsItCleanly) {
   EXPECT_LT(seconds, 6) << "of 13";
   EXPECT_FALSE(read_file(path("live/run.sqlite-wal"))) << "the store is closed";
   EXPECT_TRUE(read_file(path("live/trajectory_odometry.tum")));
+}
+
+// The stream goes on after the last recorded sample. The odometry is that of the recording, bit for bit.
+TEST_F(RunLive, KilledAtAnyMomentItGoesOn) {
+  copy_finished_run("recorded");
+  const std::string expected = read_file(path("recorded/trajectory_odometry.tum")).value();
+  for (const auto& [after_ms, state_every_s] :
+       {std::pair(150, "30"), {600, "30"}, {1300, "0.2"}, {1900, "30"}, {2400, "0.2"}, {3100, "0.5"}}) {
+    SCOPED_TRACE(after_ms);
+    const std::string output = "killed_" + std::to_string(after_ms), state = "commit.state_every_s=";
+    ProgramLimits limits;
+    limits.kill_after = std::chrono::milliseconds(after_ms);
+    run_live(output, {"--speed", "2", "--set", state + state_every_s}, limits);
+    const ProgramResult resumed = run_live(output, {"--speed", "10", "--set", state + state_every_s, "--resume"});
+    ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+    EXPECT_EQ(read_file(path(output + "/trajectory_odometry.tum")).value(), expected);
+  }
+}
+
+TEST_F(RunLive, ResumedTwiceItHasAllRecordings) {
+  ProgramLimits limits;
+  limits.kill_after = std::chrono::milliseconds(1600);
+  run_live("live", {"--speed", "1.5"}, limits);
+  run_live("live", {"--speed", "1.5", "--resume"}, limits);
+  const ProgramResult resumed = run_live("live", {"--speed", "10", "--resume"});
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  EXPECT_EQ(summary_of(path("live"))["frames"], 14);
+  EXPECT_TRUE(read_file(path("live/recording_3/recording.yaml")));
 }
 
 TEST_F(RunLive, TheWatchdogNamesTheStageThatHangs) {

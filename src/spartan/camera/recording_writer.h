@@ -24,6 +24,9 @@ struct RecordingOptions {
   SensorNoise noise = {};      ///< specified (nominal) sensor noise
 };
 
+/// Of a recording of a stream.
+RecordingOptions recording_options_of(const StreamInfo& info);
+
 /// Image files of a recording; both are lossless.
 enum class ImageFiles {
   png,
@@ -82,6 +85,10 @@ class RecordingWriter {
   std::unique_ptr<State> state_;
 };
 
+/// Makes an unfinished recording readable: rows that are not complete are cut off, and recording.yaml is written. Does
+/// nothing to a finished one. Codes: those of reading and writing files.
+Status finish_interrupted_recording(const std::string& folder, const StreamInfo& info);
+
 /// How far a StreamRecorder has come.
 struct RecorderProgress {
   std::int64_t frames = 0, sensor_samples = 0;  ///< written
@@ -104,6 +111,10 @@ class StreamRecorder {
 
   /// Takes a share of the pixels. Placeholders of missing frames are not recorded.
   void add(const Sample& sample);
+  /// Number of samples that were added.
+  std::int64_t added() const;
+  /// Waits until the first `count` samples are on disk and listed, or writing has ended.
+  void wait_until_synced(std::int64_t count);
   /// Waits until everything is on disk, and finishes the recording. Codes: `output`, `resources`.
   Status finish();
   RecorderProgress progress() const;

@@ -62,6 +62,9 @@ class SampleStream {
 
   virtual DiscardedSamples discarded() const { return {}; }
 
+  /// Before the first call of read(): a stream that can begin anywhere begins after this stamp.
+  virtual void start_after(Stamp /*stamp*/) {}
+
   /// Number of frames of a pair that can be had before the first call of read(), for what is chosen by images: all
   /// listed ones of a recording, those that a camera takes for this purpose.
   virtual std::size_t previews(const std::string& pair) const = 0;

@@ -34,4 +34,12 @@ Stamp stamp_of(const Sample& sample) {
       sample);
 }
 
+std::string source_of(const Sample& sample) {
+  if (const auto* frame = std::get_if<StereoFrame>(&sample)) return frame->pair;
+  if (const auto* missing = std::get_if<MissingFrame>(&sample)) return missing->pair;
+  if (std::holds_alternative<ImuSample>(sample)) return ":imu";
+  if (std::holds_alternative<WheelSample>(sample)) return ":wheels";
+  return std::holds_alternative<CompassSample>(sample) ? ":compass" : ":inclinometer";
+}
+
 }  // namespace spartan

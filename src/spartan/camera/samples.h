@@ -144,5 +144,8 @@ using Sample = std::variant<StereoFrame, ImuSample, WheelSample, CompassSample, 
 
 /// The stamp by which samples are ordered; for a stereo frame the left one.
 Stamp stamp_of(const Sample& sample);
+/// What a sample is one of: the name of the pair, or "imu", "wheels", "compass" or "inclinometer" with a leading colon,
+/// which no name of a pair has.
+std::string source_of(const Sample& sample);
 
 }  // namespace spartan

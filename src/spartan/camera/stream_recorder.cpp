@@ -29,7 +29,8 @@ struct StreamRecorder::State {
   std::condition_variable changed;
   std::deque<Sample> waiting;
   std::size_t bytes = 0;
-  bool ended = false;
+  bool ended = false, sync_now = false;
+  std::int64_t added = 0, synced = 0;  // samples
   RecorderProgress progress;
   std::thread thread;
 
@@ -40,12 +41,7 @@ struct StreamRecorder::State {
 
 Result<std::unique_ptr<StreamRecorder>> StreamRecorder::create(const std::string& folder, const StreamInfo& info,
                                                                ImageFiles images) {
-  RecordingOptions options;
-  options.name = info.name;
-  options.description = info.description;
-  options.noise = info.noise;
-  if (info.gravity_m_s2) options.gravity_m_s2 = *info.gravity_m_s2;
-  auto writer = RecordingWriter::create_batched(folder, info.rig, options, images);
+  auto writer = RecordingWriter::create_batched(folder, info.rig, recording_options_of(info), images);
   if (!writer) return failure(writer);
   return std::unique_ptr<StreamRecorder>(new StreamRecorder(std::make_unique<State>(std::move(*writer))));
 }
@@ -64,6 +60,7 @@ void StreamRecorder::add(const Sample& sample) {
   {
     const std::lock_guard lock(state_->mutex);
     if (!state_->progress.status) return;
+    ++state_->added;
     if (state_->bytes + bytes > kMostBytes) {
       ++state_->progress.dropped;
       return;
@@ -71,7 +68,7 @@ void StreamRecorder::add(const Sample& sample) {
     state_->bytes += bytes;
     state_->waiting.push_back(sample);
   }
-  state_->changed.notify_one();
+  state_->changed.notify_all();
 }
 
 Status StreamRecorder::finish() {
@@ -79,13 +76,25 @@ Status StreamRecorder::finish() {
     const std::lock_guard lock(state_->mutex);
     state_->ended = true;
   }
-  state_->changed.notify_one();
+  state_->changed.notify_all();
   if (state_->thread.joinable()) {
     state_->thread.join();
     // What was written before an error stays an unfinished recording.
     if (state_->progress.status) state_->progress.status = state_->writer.finish();
   }
   return state_->progress.status;
+}
+
+std::int64_t StreamRecorder::added() const {
+  const std::lock_guard lock(state_->mutex);
+  return state_->added;
+}
+
+void StreamRecorder::wait_until_synced(std::int64_t count) {
+  std::unique_lock lock(state_->mutex);
+  state_->sync_now = state_->synced < count;
+  state_->changed.notify_all();
+  state_->changed.wait(lock, [&] { return state_->synced >= count || state_->ended || !state_->progress.status; });
 }
 
 RecorderProgress StreamRecorder::progress() const {
@@ -97,27 +106,35 @@ void StreamRecorder::State::run() {
   auto next_sync = std::chrono::steady_clock::now() + kSyncEvery;
   for (;;) {
     std::deque<Sample> samples;
-    bool last = false;
+    bool last = false, sync = false;
+    std::int64_t taken = 0;
     {
       std::unique_lock lock(mutex);
-      changed.wait_until(lock, next_sync, [this] { return ended || !waiting.empty(); });
+      changed.wait_until(lock, next_sync, [this] { return ended || sync_now || !waiting.empty(); });
       samples.swap(waiting);
       last = ended;
+      sync = std::exchange(sync_now, false) || std::chrono::steady_clock::now() >= next_sync;
+      taken = added;
     }
     Status status;
     try {
       status = write_all(std::move(samples));
-      if (status && std::chrono::steady_clock::now() >= next_sync) {
+      if (status && sync) {
         status = writer.sync();
         next_sync = std::chrono::steady_clock::now() + kSyncEvery;
       }
     } catch (const std::bad_alloc& exception) {
       status = tl::unexpected(out_of_memory(exception));
     }
-    if (status && !last) continue;
     const std::lock_guard lock(mutex);
     if (!status) progress.status = status;
+    if (status && sync) synced = taken;
+    if (status && !last) {
+      changed.notify_all();
+      continue;
+    }
     waiting.clear();
+    changed.notify_all();
     return;
   }
 }

@@ -366,6 +366,9 @@ bool Pipeline::gravity_measured() const {
 bool Pipeline::heading_east() const {
   return state_->localizer.estimate().heading.east;
 }
+void Pipeline::set_pace(Pace pace) {
+  state_->pace = pace;
+}
 void Pipeline::show_stages_in(RunningStage& front_end) {
   state_->clock.show_in(front_end);
 }

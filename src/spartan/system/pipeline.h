@@ -146,6 +146,10 @@ class Pipeline {
   bool gravity_measured() const;
   bool heading_east() const;
 
+  /// Of a pipeline that was created with Pace::live: whether frames wait for the back end from now on, e.g. while a
+  /// resumed run processes what was recorded.
+  void set_pace(Pace pace);
+
   /// From now on a watchdog can see in `front_end` which stage runs. Borrowed.
   void show_stages_in(RunningStage& front_end);
   /// Whether views of a stop are collected or the map of one is made.

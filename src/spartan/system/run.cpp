@@ -40,9 +40,30 @@ struct RunSource {
   SampleStream& stream;
   Recording* recording;  // the stream, if it is one; null: live
   QueuedStream* queue;   // through which a live stream is read
-
-  SampleStream& samples() const { return queue ? *queue : stream; }
 };
+
+// What a live run has recorded until it was interrupted.
+Result<std::vector<std::unique_ptr<Recording>>> recordings_of(const RunFolder& folder, const StreamInfo& info) {
+  std::vector<std::unique_ptr<Recording>> recordings;
+  std::error_code error;
+  for (int i = 1; std::filesystem::exists(folder.recording(i), error); ++i) {
+    if (Status s = finish_interrupted_recording(folder.recording(i), info); !s) return failure(s);
+    auto recording = open_recording(folder.recording(i));
+    // One that was interrupted before it listed a frame.
+    if (!recording && recording.error().code == ErrorCode::input) continue;
+    if (!recording) return failure(recording);
+    recordings.push_back(std::move(*recording));
+  }
+  return recordings;
+}
+
+// The folder of the recording that is to be made.
+std::string next_recording(const RunFolder& folder) {
+  std::error_code error;
+  int number = 1;
+  while (std::filesystem::exists(folder.recording(number), error)) ++number;
+  return folder.recording(number);
+}
 
 void report_sequence(const RecordingInfo& info, const Log& log) {
   const SequenceReport& s = info.sequence;
@@ -236,13 +257,21 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   auto recorder =
       RunRecorder::create(std::move(*store), folder, options, source.recording ? Pace::recorded : Pace::live);
   if (!recorder) return failure(recorder);
+  std::optional<ResumedStream> resumed;
+  if (source.queue && request.resume) {
+    auto recordings = recordings_of(folder, info);
+    if (!recordings) return failure(recordings);
+    resumed.emplace(std::move(*recordings), *source.queue);
+  }
   if (source.queue && request.record) {
-    auto recorded = StreamRecorder::create(folder.recording(), info, request.recorded_images);
+    auto recorded = StreamRecorder::create(next_recording(folder), info, request.recorded_images);
     if (!recorded) return failure(recorded);
     source.queue->record_with(std::move(*recorded));
   }
-  RunLoop run_loop(request, hooks, source.samples(), source.recording, std::move(setup->pipeline), std::move(*recorder),
-                   start.time, start.cpu_s);
+  SampleStream& live = source.queue ? *source.queue : source.stream;
+  const RunStream stream{resumed ? *resumed : live, source.recording, resumed ? &*resumed : nullptr,
+                         source.queue ? source.queue->recorder() : nullptr};
+  RunLoop run_loop(request, hooks, stream, std::move(setup->pipeline), std::move(*recorder), start.time, start.cpu_s);
   if (Status s = run_loop.begin(); !s) return failure(s);
   const Status processed = run_loop.process_samples();
   if (run_loop.usable_frames() > 0) replaced->discard();
@@ -299,10 +328,6 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
 
 Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, const RunHooks& hooks) {
   const RunStart start;
-  if (request.resume) {
-    return failure(ErrorCode::usage, "a live run cannot be resumed", stream.info().path,
-                   "run into a new folder, or resume with the recording");
-  }
   const StereoPair* const odometry = odometry_pair_of(stream.info().rig, request.options);
   try {
     QueuedStream queue(stream, odometry ? odometry->name : "", kQueueBytes);

@@ -71,8 +71,9 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks);
 
 /// Runs over a live stream until it ends, RunRequest::max_frames were processed, or RunHooks::should_stop says so. A
 /// thread reads the stream into a queue; where the queue is full, frames are dropped, those of other pairs than that of
-/// the odometry first, and counted. Codes: as run(), and those of SampleStream::read(); `usage` with
-/// RunRequest::resume, which a live stream cannot.
+/// the odometry first, and counted. With RunRequest::resume, what the run
+/// had recorded after its last checkpoint is processed first; then the stream goes on. Codes: as run(), and those of
+/// SampleStream::read().
 Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, const RunHooks& hooks);
 
 }  // namespace spartan

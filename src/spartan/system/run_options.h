@@ -137,7 +137,7 @@ struct RunOptions {
   MapSource maps_from = MapSource::automatic;  ///< of which frames
   KeyframeOptions keyframes;
   int stop_delay_frames = 3;  ///< most frames from leaving a stop to the frame whose pose its map corrects
-  SlamOptions slam;            ///< map matching and the global map
+  SlamOptions slam;           ///< map matching and the global map
   LocalizationOptions localization;
   bool smoothed_trajectory = true;  ///< run(): smooth the localization after the last frame
   TerrainOptions terrain;

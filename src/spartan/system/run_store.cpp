@@ -170,6 +170,7 @@ Status RunStore::State::prepare() {
   if (Status s = make(insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"); !s) return s;
   if (Status s = make(replace_checkpoint, "INSERT OR REPLACE INTO memory VALUES (1,?,?)"); !s) return s;
   if (Status s = make(replace_content, "INSERT OR REPLACE INTO identity VALUES ('content',?)"); !s) return s;
+  if (Status s = make(replace_stream, "INSERT OR REPLACE INTO identity VALUES ('stream',?)"); !s) return s;
   if (Status s = make(replace_elapsed, "INSERT OR REPLACE INTO elapsed VALUES (1,?,?)"); !s) return s;
   if (Status s = make(replace_counts, kReplaceCounts); !s) return s;
   if (Status s = make(select_progress, kSelectProgress); !s) return s;
@@ -248,7 +249,11 @@ Status RunStore::State::write_checkpoint(const Checkpoint& checkpoint) {
   if (Status s = replace_checkpoint->bind(1, source.samples_taken).bind(2, memory).run(); !s) return s;
   if (Status s = replace_elapsed->bind(1, 1e3 * elapsed.wall_s).bind(2, 1e3 * elapsed.cpu_s).run(); !s) return s;
   if (Status s = replace_counts->run(); !s) return s;
-  return replace_content->bind(1, fmt::format("{:016x}", source.content_hash)).run();
+  if (Status s = replace_content->bind(1, fmt::format("{:016x}", source.content_hash)).run(); !s) return s;
+  if (source.last_stamps.empty()) return {};
+  std::string text;
+  for (const auto& [name, stamp] : source.last_stamps) text += fmt::format("{} {}\n", stamp.ns, name);
+  return replace_stream->bind(1, text).run();
 }
 
 Status RunStore::State::write(const LocalizationRecord& l) {

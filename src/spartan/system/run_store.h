@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -107,6 +108,8 @@ class RunStore {
   struct SourcePosition {
     std::int64_t samples_taken = 0;  ///< for Recording::seek()
     std::uint64_t content_hash = 0;  ///< Recording::content_hash()
+    /// Of a live stream: the latest stamp of each pair and each sensor (stream_name()).
+    std::map<std::string, Stamp> last_stamps{};
   };
   /// State from which a run is resumed. Only the latest is kept.
   struct Checkpoint {

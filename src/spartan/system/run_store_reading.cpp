@@ -2,7 +2,9 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -136,6 +138,19 @@ std::optional<FrameRecord> frame_of(const SqlStatement& row) {
   return r;
 }
 
+// Rows "<stamp_ns> <name>". None where one is not.
+std::optional<std::map<std::string, Stamp>> last_stamps_of(const std::string& text) {
+  std::map<std::string, Stamp> stamps;
+  std::istringstream rows(text);
+  for (std::string row; std::getline(rows, row);) {
+    Stamp stamp;
+    const auto [end, error] = std::from_chars(row.data(), row.data() + row.size(), stamp.ns);
+    if (error != std::errc() || *end != ' ' || end + 1 == row.data() + row.size()) return std::nullopt;
+    stamps[std::string(end + 1)] = stamp;
+  }
+  return stamps;
+}
+
 }  // namespace
 
 Result<std::vector<Bytes>> RunStore::localization_inputs() {
@@ -266,7 +281,8 @@ Result<std::vector<MapRecord>> RunStore::maps() {
 
 Result<std::optional<RunStore::Checkpoint>> RunStore::checkpoint() {
   auto select = state_->db.prepare(
-      "SELECT samples_taken, stages, (SELECT value FROM identity WHERE key = 'content'), wall_ms, cpu_ms "
+      "SELECT samples_taken, stages, (SELECT value FROM identity WHERE key = 'content'), wall_ms, cpu_ms, "
+      "coalesce((SELECT value FROM identity WHERE key = 'stream'), '') "
       "FROM memory LEFT JOIN elapsed USING (id)");
   if (!select) return failure(select);
   const auto row = select->step();
@@ -276,8 +292,12 @@ Result<std::optional<RunStore::Checkpoint>> RunStore::checkpoint() {
   if (!remove_checksum(checkpoint.pipeline_state)) return damaged_table(state_->db, "memory", "the checksum differs");
   const std::string hash = select->text(2);
   const auto [end, error] = std::from_chars(hash.data(), hash.data() + hash.size(), checkpoint.source.content_hash, 16);
-  if (error == std::errc() && end == hash.data() + hash.size()) return checkpoint;
-  return damaged_table(state_->db, "identity", "'content' is missing or not a number");
+  if (error != std::errc() || end != hash.data() + hash.size())
+    return damaged_table(state_->db, "identity", "'content' is missing or not a number");
+  auto stamps = last_stamps_of(select->text(5));
+  if (!stamps) return damaged_table(state_->db, "identity", "'stream' has a row that is not a stamp and a name");
+  checkpoint.source.last_stamps = std::move(*stamps);
+  return checkpoint;
 }
 
 }  // namespace spartan

@@ -111,8 +111,16 @@ void ReplayStream::read_ahead() {
   }
 }
 
-// The next sample, shifted; none at the end.
+// The next sample after `start_after_`; none at the end.
 Result<std::optional<Sample>> ReplayStream::fetch() {
+  for (;;) {
+    auto sample = fetch_any();
+    if (!sample || !*sample || !start_after_ || stamp_of(**sample) > *start_after_) return sample;
+  }
+}
+
+// The next sample, shifted; none at the end.
+Result<std::optional<Sample>> ReplayStream::fetch_any() {
   auto sample = recording_->next();
   if (!sample) return sample;
   if (!*sample && passes_left_ > 1 && first_stamp_) {

@@ -42,6 +42,7 @@ class ReplayStream : public SampleStream {
 
   const StreamInfo& info() const override { return info_; }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
+  void start_after(Stamp stamp) override { start_after_ = stamp; }
   /// Only after the end.
   DiscardedSamples discarded() const override { return recording_->discarded(); }
   /// Only before the first call of read().
@@ -63,6 +64,7 @@ class ReplayStream : public SampleStream {
 
   void read_ahead();
   Result<std::optional<Sample>> fetch();
+  Result<std::optional<Sample>> fetch_any();
   bool has_room() const { return ahead_.size() < kAhead && frames_ahead_ < kFramesAhead; }
   void shift(Sample& sample) const;
   void note(const Sample& sample);
@@ -73,6 +75,7 @@ class ReplayStream : public SampleStream {
   double speed_;
   int passes_left_;
   ReplayClock clock_;
+  std::optional<Stamp> start_after_;
   std::optional<ReplayClock::Time> start_;
   std::optional<Stamp> start_stamp_;
 

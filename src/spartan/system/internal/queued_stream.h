@@ -28,6 +28,7 @@ class QueuedStream : public SampleStream {
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
   /// Only after the end.
   DiscardedSamples discarded() const override { return stream_.discarded(); }
+  void start_after(Stamp stamp) override { stream_.start_after(stamp); }
   std::size_t previews(const std::string& pair) const override { return stream_.previews(pair); }
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
     return stream_.preview(pair, index);

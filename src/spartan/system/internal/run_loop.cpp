@@ -64,7 +64,7 @@ Status RunLoop::begin() {
   for (const FrameRecord& frame : *frames) usable_frames_ += frame.status != "missing";
   if (Status status = pipeline_.restore((*checkpoint)->pipeline_state, recorder_->tiles()); !status) return status;
   for (const FrameKey& key : pipeline_.pending_frames()) {
-    const auto frame = recording_->frame_at(key.pair, key.left_stamp);
+    const auto frame = frame_at(key);
     if (!frame) return failure(frame);
     if (Status status = pipeline_.restore_frame(*frame); !status) return status;
   }
@@ -75,7 +75,17 @@ Status RunLoop::begin() {
   return seek(**checkpoint);
 }
 
+Result<StereoFrame> RunLoop::frame_at(const FrameKey& key) {
+  return recording_ ? recording_->frame_at(key.pair, key.left_stamp)
+                    : resumed_stream_->frame_at(key.pair, key.left_stamp);
+}
+
 Status RunLoop::seek(const RunStore::Checkpoint& checkpoint) {
+  if (!recording_) {
+    last_stamps_ = checkpoint.source.last_stamps;
+    resumed_stream_->skip_until(last_stamps_);
+    return {};
+  }
   if (Status sought = recording_->seek(checkpoint.source.samples_taken); !sought) return sought;
   if (recording_->content_hash() == checkpoint.source.content_hash) return {};
   return failure(ErrorCode::configuration,
@@ -119,6 +129,7 @@ Status RunLoop::process_until_end() {
     if (read->state == StreamRead::State::none_yet) continue;
     ++samples_taken_;
     arrived_ = read->arrived;
+    if (!recording_) last_stamps_[source_of(*read->sample)] = stamp_of(*read->sample);
     front_end_.begin("front end");
     Status status = process(*read->sample);
     front_end_.end(nullptr);
@@ -129,6 +140,8 @@ Status RunLoop::process_until_end() {
 
 // The time of waiting for a live sample is not that of a stage.
 Result<StreamRead> RunLoop::read() {
+  catching_up_ = resumed_stream_ && resumed_stream_->is_catching_up();
+  if (resumed_stream_) pipeline_.set_pace(catching_up_ ? Pace::recorded : Pace::live);
   if (!recording_) return stream_.read(kStopPoll);
   return clock_.measure("camera", [&] { return stream_.read({}); });
 }
@@ -192,7 +205,7 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
     return {};
   }
   FrameResult& output = **result;
-  if (!recording_) latencies_.add(arrived_, std::chrono::steady_clock::now(), at_stop);
+  if (!recording_ && !catching_up_) latencies_.add(arrived_, std::chrono::steady_clock::now(), at_stop);
   ++usable_frames_;
   RunResult recorded;
   FrameRecord& record = recorded.step.frame.emplace();
@@ -278,7 +291,13 @@ void RunLoop::report_estimate() {
 void RunLoop::add_checkpoint(RunResult& result) {
   last_checkpoint_ = std::chrono::steady_clock::now();
   const std::uint64_t content = recording_ ? recording_->content_hash() : 0;
-  result.checkpoint = RunStore::Checkpoint{pipeline_.save(), {samples_taken_, content}, elapsed()};
+  result.checkpoint = RunStore::Checkpoint{pipeline_.save(), {samples_taken_, content, last_stamps_}, elapsed()};
+  // The frames that the back end works on are read again from the recording.
+  if (stream_recorder_) {
+    result.before_checkpoint = [recorder = stream_recorder_, count = stream_recorder_->added()] {
+      recorder->wait_until_synced(count);
+    };
+  }
   result.maps = pipeline_.take_map_changes();
 }
 

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +16,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/system/internal/latency_record.h"
+#include "spartan/system/internal/resumed_stream.h"
 #include "spartan/system/internal/run_recorder.h"
 #include "spartan/system/internal/watchdog.h"
 #include "spartan/system/pipeline.h"
@@ -24,19 +26,27 @@
 
 namespace spartan::internal {
 
+/// Where the samples of a run come from. Borrowed; the last three may be null.
+struct RunStream {
+  SampleStream& samples;
+  Recording* recording;      ///< the samples, if they are recorded; null: live
+  ResumedStream* resumed;    ///< the samples, if the run is live and is resumed
+  StreamRecorder* recorder;  ///< that records a live stream
+};
+
 /// Feeds the samples of a stream to the pipeline and its results to the recorder, and now and then the state of the
 /// pipeline.
 class RunLoop {
  public:
-  /// `recording`: the stream, where it is one that can be resumed. `start`, `start_cpu_s`: when this execution of the
-  /// run began (core/stage_clock.h).
-  RunLoop(const RunRequest& request, const RunHooks& hooks, SampleStream& stream, Recording* recording,
-          Pipeline pipeline, std::unique_ptr<RunRecorder> recorder, std::chrono::steady_clock::time_point start,
-          double start_cpu_s)
+  /// `start`, `start_cpu_s`: when this execution of the run began (core/stage_clock.h).
+  RunLoop(const RunRequest& request, const RunHooks& hooks, const RunStream& stream, Pipeline pipeline,
+          std::unique_ptr<RunRecorder> recorder, std::chrono::steady_clock::time_point start, double start_cpu_s)
       : request_(request),
         hooks_(hooks),
-        stream_(stream),
-        recording_(recording),
+        stream_(stream.samples),
+        recording_(stream.recording),
+        resumed_stream_(stream.resumed),
+        stream_recorder_(stream.recorder),
         recorder_(std::move(recorder)),
         pipeline_(std::move(pipeline)),
         start_(start),
@@ -67,6 +77,7 @@ class RunLoop {
   Status process_until_end();
   Result<StreamRead> read();
   Status seek(const RunStore::Checkpoint& checkpoint);
+  Result<StereoFrame> frame_at(const FrameKey& key);
   Status process(const Sample& sample);
   Status finish();
   /// `fault`: of the image that is missing; empty where both are there.
@@ -83,6 +94,9 @@ class RunLoop {
   const RunHooks& hooks_;
   SampleStream& stream_;
   Recording* recording_;  // null: live
+  ResumedStream* resumed_stream_;
+  StreamRecorder* stream_recorder_;
+  std::map<std::string, Stamp> last_stamps_;  // of a live stream, by source_of()
   std::unique_ptr<RunRecorder> recorder_;
   Pipeline pipeline_;  // reads map tiles through the recorder
   RunningStage front_end_;
@@ -103,6 +117,7 @@ class RunLoop {
   std::chrono::steady_clock::time_point arrived_;  // of the sample that is processed
   LatencyRecord latencies_;
   bool stopped_ = false;
+  bool catching_up_ = false;  // with what a resumed live run had recorded
   bool complete_ = false;
   bool resumed_ = false;
   std::optional<std::int64_t> resumed_from_frame_;

@@ -141,6 +141,7 @@ Status RunRecorder::process(RunResult result) {
   if (batch_.empty()) oldest_ = std::chrono::steady_clock::now();
   batch_.push_back(std::move(result.step));
   const bool due = result.checkpoint || result.commit_now || std::chrono::steady_clock::now() >= commit_time();
+  if (result.checkpoint && result.before_checkpoint) result.before_checkpoint();
   return due ? commit(result.checkpoint, result.maps) : Status();
 }
 

@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -30,7 +31,8 @@ struct RunResult {
   bool commit_now = false;             ///< do not wait for CommitOptions::every_s
   /// The state after this result, if the run can be resumed from here.
   std::optional<RunStore::Checkpoint> checkpoint;
-  MapChanges maps;  ///< with a checkpoint
+  MapChanges maps;                            ///< with a checkpoint
+  std::function<void()> before_checkpoint{};  ///< waits for what the checkpoint refers to; may be empty
 };
 
 /// Results that wait for the disk, and what became of them.

@@ -18,7 +18,7 @@ struct RunStore::State {
   Database db;
   std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_slam, insert_health, insert_inputs,
       insert_smoothed, insert_terrain, insert_map, select_progress, replace_checkpoint, replace_content,
-      replace_elapsed, replace_counts;
+      replace_elapsed, replace_counts, replace_stream;
   /// How far the stored run has come.
   struct Progress {
     std::int64_t frames = 0, samples_taken = 0;  ///< committed frames; samples at the latest checkpoint, −1: none

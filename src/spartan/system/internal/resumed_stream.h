@@ -1,0 +1,52 @@
+// The rest of what a live run had recorded before it was interrupted, and then its live stream.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "spartan/camera/recording.h"
+#include "spartan/camera/sample_stream.h"
+
+namespace spartan::internal {
+
+/// Recorded samples come at once, the live ones when they arrive. Samples that the run had processed, or that are in a
+/// recording and come again, are skipped: those whose stamps are not after the last one of their source. Numbers of
+/// live frames go on after those of the recordings.
+class ResumedStream : public SampleStream {
+ public:
+  /// `recordings`: in their order. `live` is borrowed.
+  ResumedStream(std::vector<std::unique_ptr<Recording>> recordings, SampleStream& live)
+      : recordings_(std::move(recordings)), live_(live) {}
+
+  const StreamInfo& info() const override { return live_.info(); }
+  Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
+  DiscardedSamples discarded() const override { return live_.discarded(); }
+  std::size_t previews(const std::string& pair) const override { return live_.previews(pair); }
+  Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
+    return live_.preview(pair, index);
+  }
+
+  /// Before the first call of read(): the latest stamps that were processed, by source_of().
+  void skip_until(std::map<std::string, Stamp> last) { last_ = std::move(last); }
+  /// Whether the next sample may be a recorded one.
+  bool is_catching_up() const { return next_ < recordings_.size(); }
+  /// A recorded frame. Code `input` where none has this stamp.
+  Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp);
+
+ private:
+  bool is_new(const Sample& sample);
+  void number(Sample& sample);
+
+  std::vector<std::unique_ptr<Recording>> recordings_;
+  SampleStream& live_;
+  std::size_t next_ = 0;  // recording that is read
+  std::map<std::string, Stamp> last_;
+  std::int64_t last_id_ = -1, id_offset_ = 0;
+  bool live_has_begun_ = false;
+};
+
+}  // namespace spartan::internal
