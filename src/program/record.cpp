@@ -42,7 +42,6 @@ Status record_stream(SampleStream& stream, StreamRecorder& recorder, double seco
 }
 
 Result<ExitCode> record_command(const Context& context, const RecordArguments& arguments) {
-  if (Status fresh = expect_new_folder(context, arguments.output); !fresh) return failure(fresh);
   auto open = open_options(arguments.recording);
   if (!open) return failure(open);
   const auto stream = open_live_stream(arguments.input, *open, arguments.live);
@@ -77,7 +76,7 @@ void add_record(CLI::App& app, Context& context) {
   auto a = std::make_shared<RecordArguments>();
   CLI::App* command = add_command(
       app, context, "record", "Record a live stream: images and sensor samples at their full rate",
-      "record replay:$SPARTAN_DATA/kitti_06 -o recording", [&context, a] { return record_command(context, *a); });
+      "record replay:$SPARTAN_DATA/kitti_06 -o recorded_06", [&context, a] { return record_command(context, *a); });
   command->add_option("input", a->input, "Address of the live stream: replay:FOLDER.")->required();
   command->add_option("-o,--output", a->output, "Folder of the recording to create.")->required();
   command->add_option("--rig", a->recording.rig,

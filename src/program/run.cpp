@@ -228,7 +228,7 @@ void add_run(CLI::App& app, Context& context) {
       "Publish poses at the rate of the IMU, health and maps as JSON lines: to - (standard output, without the "
       "summary), to a FIFO, to tcp:PORT of this computer, or to tcp:ADDRESS:PORT (default: nowhere).");
   command->add_flag("--no-recording", a->no_recording,
-                    "Of a live run: do not record the stream in the folder `recording` of the run.");
+                    "Of a live run: do not record the stream in the folder `live` of the run.");
   add_recorded_images_option(*command, a->record_images);
   command
       ->add_option("--watchdog", a->watchdog_s,

@@ -166,7 +166,7 @@ TEST_F(RunLive, ResumedTwiceItHasAllRecordings) {
   const ProgramResult resumed = run_live("live", {"--speed", "10", "--resume"});
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_EQ(summary_of(path("live"))["frames"], 14);
-  EXPECT_TRUE(read_file(path("live/recording_3/recording.yaml")));
+  EXPECT_TRUE(read_file(path("live/live/3/recording.yaml")));
 }
 
 TEST_F(RunLive, TheWatchdogNamesTheStageThatHangs) {

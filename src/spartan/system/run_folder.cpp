@@ -80,7 +80,7 @@ Result<ReplacedFolder> replace_run_folder(const RunFolder& folder) {
                                                       "trajectory_smoothed.tum",
                                                       "maps",
                                                       "terrain",
-                                                      "recording",
+                                                      "live",
                                                       "report"};
   std::error_code error;
   if (!fs::exists(folder.store(), error)) return ReplacedFolder();  // prepare_run_folder() tells

@@ -50,10 +50,8 @@ struct RunFolder {
   std::string rig() const { return path + "/rig.yaml"; }
   std::string terrain() const { return path + "/terrain"; }
   std::string maps() const { return path + "/maps"; }
-  /// What a live run has recorded of its stream; after each resume another one.
-  std::string recording(int number = 1) const {
-    return path + "/recording" + (number > 1 ? "_" + std::to_string(number) : "");
-  }
+  /// What a live run has recorded of its stream, from 1; after each resume another one.
+  std::string recording(int number) const { return path + "/live/" + std::to_string(number); }
   /// Without extension.
   std::string local_map(Stamp stamp) const { return maps() + "/local_" + std::to_string(stamp.ns); }
   /// Without extension.
