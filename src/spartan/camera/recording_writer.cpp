@@ -412,8 +412,9 @@ Status finish_interrupted_recording(const std::string& folder, const StreamInfo&
   std::error_code error;
   if (fs::exists(folder + "/recording.yaml", error)) return {};
   std::vector<std::string> tables{folder + "/frames.csv"};
-  for (const std::string& name : list_folder(folder + "/sensors").value_or(std::vector<std::string>()))
-    tables.push_back(folder + "/sensors/" + name);
+  const fs::path sensors = fs::path(folder) / "sensors";
+  for (const std::string& name : list_folder(sensors.string()).value_or(std::vector<std::string>()))
+    tables.push_back((sensors / name).string());
   for (const std::string& path : tables) {
     auto table = read_file(path);
     if (!table) return failure(table);

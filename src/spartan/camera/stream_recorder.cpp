@@ -141,7 +141,7 @@ void StreamRecorder::State::run() {
 
 Status StreamRecorder::State::write_all(std::deque<Sample> samples) {
   for (; !samples.empty(); samples.pop_front()) {
-    const Status written = write(samples.front());
+    Status written = write(samples.front());
     const bool is_frame = std::holds_alternative<StereoFrame>(samples.front());
     const std::lock_guard lock(mutex);
     bytes -= bytes_of(samples.front());

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <ostream>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -22,6 +23,7 @@ struct Runner {
   const char* name;
   int threads;
   bool own_thread;
+  friend std::ostream& operator<<(std::ostream& out, const Runner& runner) { return out << runner.name; }
 };
 
 class BackEndTest : public ::testing::TestWithParam<Runner> {

@@ -167,6 +167,7 @@ TEST(StopStage, SavedStopsAreRestoredWithTheirImages) {
   ASSERT_TRUE(in.finish("state"));
   const std::vector<FrameKey> pending = other.pending_frames("narrow");
   std::vector<std::pair<std::string, double>> keys;
+  keys.reserve(pending.size());
   for (const FrameKey& key : pending) keys.emplace_back(key.pair, key.left_stamp.seconds());
   const std::vector<std::pair<std::string, double>> expected{
       {"narrow", 1}, {"wide", 1.5}, {"narrow", 2}, {"wide", 2.5}, {"wide", 3.5}};
