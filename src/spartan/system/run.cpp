@@ -307,6 +307,9 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
 Result<RunOutcome> with_store(Result<RunOutcome> outcome, const std::string& store) {
   if (!outcome) return outcome;
   const auto there = RunStore::contains_run(store);
+  // It was written a moment ago: what hinders reading now concerns the output.
+  if (!there && there.error().code == ErrorCode::read_error)
+    return failure(ErrorCode::output, there.error().what, store, there.error().hint);
   if (!there) return failure(there);
   if (*there) return outcome;
   return failure(ErrorCode::output, "was removed or replaced during the run", store, "run again into a new folder");

@@ -26,6 +26,12 @@ MapRecord record_of(const MappedStop& stop) {
   return record;
 }
 
+// Of a file that this run has just written.
+Error as_output_error(Error error) {
+  if (error.code == ErrorCode::read_error) error.code = ErrorCode::output;
+  return error;
+}
+
 std::chrono::nanoseconds seconds(double s) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(s * 1e9));
 }
@@ -35,7 +41,7 @@ std::chrono::nanoseconds seconds(double s) {
 Result<std::unique_ptr<RunRecorder>> RunRecorder::create(RunStore store, RunFolder folder, const RunOptions& options,
                                                          Pace pace) {
   auto db = Database::open(folder.store(), Database::Mode::open);
-  if (!db) return failure(db);
+  if (!db) return tl::unexpected(as_output_error(db.error()));
   auto owned = std::make_unique<Database>(std::move(*db));
   auto tiles = TileStore::open_existing(*owned);
   if (!tiles) return failure(tiles);

@@ -45,7 +45,7 @@ struct RecorderStatistics {
 /// many results wait for the disk. Pace::live: it never waits; files of terrain views and maps are then not written.
 class RunRecorder {
  public:
-  /// Opens a second connection to the store, for reading map tiles. Codes: as Database::open().
+  /// Opens a second connection to the store, for reading map tiles. Codes: `output`, `store_damaged`, `resources`.
   static Result<std::unique_ptr<RunRecorder>> create(RunStore store, RunFolder folder, const RunOptions& options,
                                                      Pace pace);
   /// Results that were not committed are lost.
