@@ -40,17 +40,23 @@ struct RunSource {
   SampleStream& stream;
   Recording* recording;  // the stream, if it is one; null: live
   QueuedStream* queue;   // through which a live stream is read
+
+  Pace pace() const { return recording ? Pace::recorded : Pace::live; }
 };
 
 // What a live run has recorded until it was interrupted.
-Result<std::vector<std::unique_ptr<Recording>>> recordings_of(const RunFolder& folder, const StreamInfo& info) {
+Result<std::vector<std::unique_ptr<Recording>>> recordings_of(const RunFolder& folder, const StreamInfo& info,
+                                                              const Log& log) {
   std::vector<std::unique_ptr<Recording>> recordings;
   std::error_code error;
   for (int i = 1; std::filesystem::exists(folder.recording(i), error); ++i) {
     if (Status s = finish_interrupted_recording(folder.recording(i), info); !s) return failure(s);
     auto recording = open_recording(folder.recording(i));
-    // One that was interrupted before it listed a frame.
-    if (!recording && recording.error().code == ErrorCode::input) continue;
+    // Such as one that was interrupted before it listed a frame.
+    if (!recording && recording.error().code == ErrorCode::input) {
+      log.warning("a recording of this run is not processed: " + recording.error().message());
+      continue;
+    }
     if (!recording) return failure(recording);
     recordings.push_back(std::move(*recording));
   }
@@ -232,7 +238,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
                               const RunHooks& given_hooks) {
   const StreamInfo& info = source.stream.info();
   const ThreadPool workers(request.threads);
-  auto setup = set_up_run(source.stream, request, workers, source.recording ? Pace::recorded : Pace::live);
+  auto setup = set_up_run(source.stream, request, workers, source.pace());
   if (!setup) return failure(setup);
   const Rig& rig = setup->rig;
   const RunOptions& options = setup->options;
@@ -254,12 +260,11 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
   if (Status s = write_file_atomically(folder.rig(), identity.rig); !s) return failure(s);
 
-  auto recorder =
-      RunRecorder::create(std::move(*store), folder, options, source.recording ? Pace::recorded : Pace::live);
+  auto recorder = RunRecorder::create(std::move(*store), folder, options, source.pace());
   if (!recorder) return failure(recorder);
   std::optional<ResumedStream> resumed;
   if (source.queue && request.resume) {
-    auto recordings = recordings_of(folder, info);
+    auto recordings = recordings_of(folder, info, hooks.log);
     if (!recordings) return failure(recordings);
     resumed.emplace(std::move(*recordings), *source.queue);
   }

@@ -87,6 +87,11 @@ Result<StreamRead> ReplayStream::read(nanoseconds timeout) {
   return StreamRead{StreamRead::State::sample, std::move(sample), std::max(when, now)};
 }
 
+DiscardedSamples ReplayStream::discarded() const {
+  const std::lock_guard lock(mutex_);
+  return discarded_;
+}
+
 void ReplayStream::read_ahead() {
   const auto thread = static_cast<id_t>(::gettid());
   static_cast<void>(::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + kNiceness));
@@ -98,6 +103,7 @@ void ReplayStream::read_ahead() {
       sample = tl::unexpected(out_of_memory(exception));
     }
     std::unique_lock lock(mutex_);
+    discarded_ = recording_->discarded();
     if (sample && *sample) {
       frames_ahead_ += is_image(**sample) ? 1 : 0;
       ahead_.push_back(std::move(**sample));

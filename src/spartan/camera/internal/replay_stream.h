@@ -43,8 +43,7 @@ class ReplayStream : public SampleStream {
   const StreamInfo& info() const override { return info_; }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
   void start_after(Stamp stamp) override { start_after_ = stamp; }
-  /// Only after the end.
-  DiscardedSamples discarded() const override { return recording_->discarded(); }
+  DiscardedSamples discarded() const override;
   /// Only before the first call of read().
   std::size_t previews(const std::string& pair) const override { return recording_->previews(pair); }
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
@@ -83,10 +82,11 @@ class ReplayStream : public SampleStream {
   std::optional<Stamp> first_stamp_;  // of the recording
   Progress offset_, last_;
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Sample> ahead_;
   std::size_t frames_ahead_ = 0;
+  DiscardedSamples discarded_;
   bool stopped_ = false, ended_ = false;
   Status status_;  // why it has ended
   std::thread thread_;

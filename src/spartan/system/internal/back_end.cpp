@@ -48,7 +48,7 @@ void BackEnd::run_next(Lock& lock) {
   running_.begin(job.name);
   try {
     job.work();
-  } catch (...) {
+  } catch (...) {  // none is lost: wait() rethrows it in the thread that needs the result
     error = std::current_exception();
   }
   running_.end(nullptr);
