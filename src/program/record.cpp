@@ -6,6 +6,7 @@
 #include "program/commands.h"
 #include "program/interrupt.h"
 #include "program/json.h"
+#include "program/live_input.h"
 #include "program/progress.h"
 #include "program/recording_arguments.h"
 #include "spartan/camera/recording_writer.h"
@@ -19,7 +20,7 @@ constexpr std::chrono::milliseconds kReadTimeout{50};
 struct RecordArguments {
   std::string input, output, images = "pnm";
   RecordingArguments recording;
-  LiveOptions live;
+  LiveArguments live;
   double seconds = 0;
 };
 
@@ -44,7 +45,7 @@ Status record_stream(SampleStream& stream, StreamRecorder& recorder, double seco
 Result<ExitCode> record_command(const Context& context, const RecordArguments& arguments) {
   auto open = open_options(arguments.recording);
   if (!open) return failure(open);
-  const auto stream = open_live_stream(arguments.input, *open, arguments.live);
+  const auto stream = open_live_input(context, arguments.input, *open, arguments.live);
   if (!stream) return failure(stream);
   auto recorder = StreamRecorder::create(arguments.output, (*stream)->info(), image_files_of(arguments.images));
   if (!recorder) return failure(recorder);
@@ -77,7 +78,7 @@ void add_record(CLI::App& app, Context& context) {
   CLI::App* command = add_command(
       app, context, "record", "Record a live stream: images and sensor samples at their full rate",
       "record replay:$SPARTAN_DATA/kitti_06 -o recorded_06", [&context, a] { return record_command(context, *a); });
-  command->add_option("input", a->input, "Address of the live stream: replay:FOLDER.")->required();
+  command->add_option("input", a->input, "Address of the live stream: replay:FOLDER or sim:SCENARIO.")->required();
   command->add_option("-o,--output", a->output, "Folder of the recording to create.")->required();
   command->add_option("--rig", a->recording.rig,
                       "Calibration file to use, in any supported format (default: that of the stream).");
@@ -86,11 +87,9 @@ void add_record(CLI::App& app, Context& context) {
       ->add_option("--seconds", a->seconds,
                    "Stop after so many seconds (default 0: at the end of the stream, or at Ctrl-C).")
       ->check(CLI::NonNegativeNumber);
-  command->add_option("--speed", a->live.speed, "Pace of a replay, relative to that of its stamps (default 1).")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--passes", a->live.passes, "How often a replay plays its recording (default 1).")
-      ->check(CLI::PositiveNumber);
+  add_live_options(*command, a->live);
   add_recorded_images_option(*command, a->images);
+  add_threads_option(*command, context);
   add_json_flag(*command, context);
 }
 

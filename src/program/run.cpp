@@ -11,6 +11,7 @@
 #include "program/commands.h"
 #include "program/interrupt.h"
 #include "program/json.h"
+#include "program/live_input.h"
 #include "program/progress.h"
 #include "program/publisher.h"
 #include "program/recording_arguments.h"
@@ -34,7 +35,7 @@ struct RunArguments {
   std::vector<std::string> set;
   bool resume = false, odometry_only = false;
   int max_frames = 0;
-  LiveOptions live;
+  LiveArguments live;
   std::string publish, record_images = "pnm";
   bool no_recording = false;
   double watchdog_s = kWatchdog_s;
@@ -111,9 +112,10 @@ void advise(const RunRequest& request, const RunOutcome& outcome, const Context&
                                                  : advice));
 }
 
-Result<RunOutcome> run_input(const RunArguments& arguments, const RunRequest& request, const RunHooks& hooks) {
-  if (!is_live_address(arguments.input)) return run(request, hooks);
-  const auto stream = open_live_stream(arguments.input, request.open, arguments.live);
+Result<RunOutcome> run_input(const Context& context, const RunArguments& arguments, const RunRequest& request,
+                             const RunHooks& hooks) {
+  if (!is_live_input(arguments.input)) return run(request, hooks);
+  const auto stream = open_live_input(context, arguments.input, request.open, arguments.live);
   if (!stream) return failure(stream);
   return run_live(**stream, request, hooks);
 }
@@ -136,7 +138,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   request.memory_bytes = memory_bound(context);
   request.max_frames = arguments.max_frames;
   request.version = SPARTAN_VERSION;
-  if (is_live_address(arguments.input)) request.watchdog_s = arguments.watchdog_s;
+  if (is_live_input(arguments.input)) request.watchdog_s = arguments.watchdog_s;
   request.record = !arguments.no_recording;
   request.recorded_images = image_files_of(arguments.record_images);
 
@@ -146,7 +148,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   }
   auto publisher = open_publisher(arguments, context);
   if (!publisher) return failure(publisher);
-  auto outcome = run_input(arguments, request, live_hooks(context, progress, publisher->get()));
+  auto outcome = run_input(context, arguments, request, live_hooks(context, progress, publisher->get()));
   if (!outcome) return failure(outcome);
   std::string text = run_summary_text(outcome->summary_json, arguments.output);
   if (!arguments.truth.empty() && !outcome->interrupted) {
@@ -154,7 +156,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
     if (!table) return failure(table);
     text += "\n" + *table;
   }
-  const bool live = is_live_address(arguments.input);
+  const bool live = is_live_input(arguments.input);
   if (live) accept_interrupt();
   if (!outcome->interrupted && !live) {
     if (Status s = write_report(request, arguments.truth, context); !s)
@@ -184,7 +186,8 @@ void add_run(CLI::App& app, Context& context) {
           "input", a->input,
           "Folder of the recording, whose layout (Spartan, KITTI odometry, KITTI raw, EuRoC/ASL, image folders) is "
           "detected and printed, or a video with the images of both cameras side by side; or the address of a live "
-          "stream: replay:FOLDER plays a recording at the pace of its stamps.")
+          "stream: replay:FOLDER plays a recording at the pace of its stamps, sim:SCENARIO is a simulated rover whose "
+          "cameras obey.")
       ->required();
   command
       ->add_option("-o,--output", a->output,
@@ -216,13 +219,7 @@ void add_run(CLI::App& app, Context& context) {
   command->add_flag("--odometry-only", a->odometry_only,
                     "Run the visual odometry alone: no localization, maps, SLAM, disparity images or "
                     "point clouds.");
-  command
-      ->add_option("--speed", a->live.speed,
-                   "Pace of a replay, relative to that of its stamps (default 1); raising it leaves less time for each "
-                   "frame.")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--passes", a->live.passes, "How often a replay plays its recording (default 1).")
-      ->check(CLI::PositiveNumber);
+  add_live_options(*command, a->live);
   command->add_option(
       "--publish", a->publish,
       "Publish poses at the rate of the IMU, health and maps as JSON lines: to - (standard output, without the "

@@ -85,9 +85,8 @@ Result<ReplacedFolder> replace_recording(const std::string& folder) {
   return ReplacedFolder::set_aside(folder, kEntries);
 }
 
-}  // namespace
-
-Result<SimulationOutcome> simulate_scenario(const Context& context, const SimulationArguments& arguments) {
+// Without a folder.
+Result<sim::SimulationRequest> read_request(const Context& context, const SimulationArguments& arguments) {
   const auto text = find_scenario(arguments.scenario);
   if (!text) return failure(text);
   auto read = sim::read_scenario(text->content, text->name);
@@ -107,15 +106,31 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
     if (!changed) return failure(changed);
     *scenario = std::move(*changed);
   }
-  if (Status valid = validate(*scenario, "--set"); !valid) return failure(valid);
+  if (Status valid = validate(*scenario, "scenario"); !valid) return failure(valid);
   if (arguments.seed) scenario->seed = *arguments.seed;
-  const auto rig = find_rig(*scenario, *text);
+  auto rig = find_rig(*scenario, *text);
   if (!rig) return failure(rig);
   auto drive = sim::plan_drive(*scenario, *rig, text->content, text->name);
   if (!drive) return failure(drive);
   auto views = rectified_views(sim::nominal_rig(*rig, scenario->nominal_rig));
   if (!views) return failure(views);
+  return sim::SimulationRequest{*scenario, std::move(*rig), std::move(*drive), std::move(*views), {}, false};
+}
 
+}  // namespace
+
+Result<std::unique_ptr<SampleStream>> open_simulation(const Context& context, const SimulationArguments& arguments,
+                                                      double speed) {
+  auto request = read_request(context, arguments);
+  if (!request) return failure(request);
+  return sim::open_live_simulation(std::move(*request), speed, ThreadPool(context.threads));
+}
+
+Result<SimulationOutcome> simulate_scenario(const Context& context, const SimulationArguments& arguments) {
+  auto request = read_request(context, arguments);
+  if (!request) return failure(request);
+  request->folder = arguments.output;
+  request->resume = arguments.resume;
   if (!arguments.resume) {
     if (Status s = expect_new_folder(context, arguments.output); !s) return failure(s);
   }
@@ -127,9 +142,7 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
   hooks.should_stop = interrupted;
   hooks.progress = [&progress](const sim::SimulationProgress& p) { progress.show(p.done, p.frames, "frames"); };
   Stopwatch watch;
-  const auto report =
-      sim::simulate({*scenario, *rig, std::move(*drive), std::move(*views), arguments.output, arguments.resume}, hooks,
-                    ThreadPool(context.threads));
+  const auto report = sim::simulate(*request, hooks, ThreadPool(context.threads));
   if (!report) return failure(report);
   replaced->discard();
   const double seconds = 1e-3 * watch.lap();
@@ -151,10 +164,21 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
 #else
 
 namespace spartan::program {
+namespace {
 
-Result<SimulationOutcome> simulate_scenario(const Context&, const SimulationArguments&) {
+tl::unexpected<Error> no_simulator() {
   return failure(ErrorCode::usage, "this build has no simulator, because Embree was not found", {},
                  "install libembree-dev and build again");
+}
+
+}  // namespace
+
+Result<SimulationOutcome> simulate_scenario(const Context&, const SimulationArguments&) {
+  return no_simulator();
+}
+
+Result<std::unique_ptr<SampleStream>> open_simulation(const Context&, const SimulationArguments&, double) {
+  return no_simulator();
 }
 
 }  // namespace spartan::program

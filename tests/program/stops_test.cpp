@@ -9,11 +9,15 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <variant>
+#include <vector>
 
 #include "program.h"
 #include "run_results.h"
+#include "spartan/camera/recording.h"
 #include "spartan/storage/database.h"
 #include "spartan/storage/geotiff.h"
+#include "spartan/system/run.h"
 #include "spartan/testing/temporary_folder.h"
 
 namespace spartan {
@@ -87,6 +91,41 @@ TEST_F(Stops, EveryFrameAndStopIsTimed) {
   EXPECT_EQ(byte_stable_content(path("part")), byte_stable_content(path("out")));
   ASSERT_TRUE(finished(run("no_maps", {"--set", "maps=false"})));
   EXPECT_EQ(times_run("no_maps", "camera"), frames);
+}
+
+// The views of a stop are no frames of the odometry: what was computed for them belongs to the next one.
+TEST_F(Stops, ARunInterruptedAfterAnySampleEndsAsIfItWasNot) {
+  std::vector<int> after{1};
+  const auto recording = open_recording(path("rec"));
+  ASSERT_TRUE(recording) << recording.error().message();
+  int samples = 0;
+  for (auto read = (*recording)->read({}); read && read->sample; read = (*recording)->read({})) {
+    ++samples;
+    const auto* frame = std::get_if<StereoFrame>(&*read->sample);
+    if (frame != nullptr && frame->pair == "wide") after.insert(after.end(), {samples, samples + 1});
+  }
+  ASSERT_GE(after.size(), 9u) << "two stops";
+  const auto run_until = [&](const std::string& output, int last, bool resume) {
+    RunRequest request;
+    request.input = path("rec");
+    request.output = path(output);
+    request.resume = resume;
+    RunHooks hooks;
+    int asked = 0;
+    hooks.should_stop = [&] { return asked++ >= last; };
+    const auto outcome = spartan::run(request, hooks);
+    ASSERT_TRUE(outcome) << outcome.error().message();
+    EXPECT_EQ(outcome->interrupted, last < samples);
+  };
+  run_until("undisturbed", samples + 1, false);
+  const auto undisturbed = byte_stable_content(path("undisturbed"));
+  for (const int last : after) {
+    if (last >= samples) continue;
+    const std::string output = fmt::format("after_{}", last);
+    run_until(output, last, false);
+    run_until(output, samples + 1, true);
+    EXPECT_EQ(byte_stable_content(path(output)), undisturbed) << last << " samples";
+  }
 }
 
 TEST_F(Stops, ArePartOfTheReport) {

@@ -48,6 +48,21 @@ struct StreamRead {
   std::chrono::steady_clock::time_point arrived;  ///< when the host had the sample complete
 };
 
+/// Exposure of an image.
+struct ExposureSettings {
+  double exposure_us = 0;  ///< µs; duration
+  double gain = 1;         ///< at least 1
+};
+
+/// Settings of cameras that run now. A setting applies to images whose exposure begins after the call; frames state
+/// what they were taken with. Can be called while another thread reads the stream.
+class CameraControl {
+ public:
+  virtual ~CameraControl() = default;
+  /// Of both cameras of a pair.
+  virtual Status set_exposure(const std::string& pair, const ExposureSettings& settings) = 0;
+};
+
 /// Samples in order of arrival. A recording yields them ordered by stamp; from a live stream they arrive late and out
 /// of order between sensors, in order within each.
 class SampleStream {
@@ -61,6 +76,9 @@ class SampleStream {
   virtual Result<StreamRead> read(std::chrono::nanoseconds timeout) = 0;
 
   virtual DiscardedSamples discarded() const { return {}; }
+
+  /// Null where the cameras cannot be controlled. Borrowed.
+  virtual CameraControl* control() { return nullptr; }
 
   /// Before the first call of read(): a stream that can begin anywhere begins after this stamp.
   virtual void start_after(Stamp /*stamp*/) {}

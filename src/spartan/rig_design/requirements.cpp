@@ -1,5 +1,3 @@
-#include "spartan/rig_design/requirements.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,6 +12,7 @@
 #include "spartan/core/pose.h"
 #include "spartan/core/strict_yaml.h"
 #include "spartan/rig_design/internal/stereo_relations.h"
+#include "spartan/rig_design/rig_designer.h"
 
 namespace spartan {
 

@@ -1,5 +1,3 @@
-#include "spartan/rig_design/requirements.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

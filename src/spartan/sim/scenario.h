@@ -122,6 +122,7 @@ struct Scenario {
   InclinometerOptions inclinometer;
   SensorFaults sensor_faults;
   CameraFaults camera_faults;
+  ArrivalOptions arrival;
   TruthOptions truth;
 
   template <class Visitor>
@@ -160,6 +161,7 @@ struct Scenario {
     v.group("inclinometer", inclinometer);
     v.list("sensor_faults", sensor_faults, "Intervals in which motion sensors fail.");
     v.list("camera_faults", camera_faults, "Intervals in which cameras fail.");
+    v.group("arrival", arrival);
     v.group("truth", truth);
   }
 };

@@ -358,6 +358,26 @@ struct ChassisOptions {
   }
 };
 
+// --- Live simulation ---
+
+/// When images arrive in a live simulation (`sim:SCENARIO`); a recording has all of them.
+struct ArrivalOptions {
+  double delay_ms = 30;  ///< ms; after the middle of the exposure
+  double jitter_ms = 5;  ///< ms; standard deviation of the delay, which varies upwards only
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field("delay_ms", delay_ms,
+            "Shortest time in milliseconds from the middle of an exposure to the arrival of the image, in a live "
+            "simulation.",
+            between(0, 10000));
+    v.field("jitter_ms", jitter_ms,
+            "Standard deviation in milliseconds of the normal distribution whose absolute values are added to delay_ms "
+            "for each frame.",
+            between(0, 10000));
+  }
+};
+
 // --- Ground truth ---
 
 /// What ground truth is written.

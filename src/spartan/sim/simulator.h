@@ -1,12 +1,14 @@
-// Simulates a drive and writes it as a recording.
+// Simulates a drive, and writes it as a recording or delivers it as a live stream.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 
+#include "spartan/camera/sample_stream.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
 #include "spartan/rig/rectified_stereo.h"
@@ -55,5 +57,12 @@ struct SimulationReport {
 /// another one).
 Result<SimulationReport> simulate(const SimulationRequest& request, const SimulationHooks& hooks,
                                   const ThreadPool& workers);
+
+/// The rover of a request as a live stream, with control of its cameras; `folder` and `resume` are not used. Its time
+/// runs `speed` times as fast as real time and stands still while an image is rendered; with `speed` 0 every sample is
+/// there at once. Images arrive as ArrivalOptions say. Until an exposure is set, each image has the one that the rule
+/// of the scenario chooses; truth.disparity has no effect. Code `configuration`: the scenario is out of bounds.
+Result<std::unique_ptr<SampleStream>> open_live_simulation(SimulationRequest request, double speed,
+                                                           const ThreadPool& workers);
 
 }  // namespace spartan::sim

@@ -324,6 +324,16 @@ std::optional<Pose> Pipeline::predict(Stamp stamp) const {
   return s.world_from_left * s.left_from_body * exp_se3(s.velocity * seconds);
 }
 
+Eigen::Vector3d Pipeline::up_in_body() const {
+  const State& s = *state_;
+  if (!s.started) return s.up_in_body.value_or(Eigen::Vector3d::UnitZ());
+  return (s.world_from_left * s.left_from_body).rotation().conjugate() * Eigen::Vector3d::UnitZ();
+}
+
+Vector6d Pipeline::body_velocity() const {
+  return state_->velocity;
+}
+
 Result<std::optional<MappedStop>> Pipeline::finish_stop() {
   if (!state_->keyframe_stage.is_pending()) return state_->finish_stop();
   auto map = state_->finish_keyframe();

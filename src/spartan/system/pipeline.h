@@ -139,6 +139,10 @@ class Pipeline {
   /// world_from_body at a time without a pose: the last pose extrapolated at constant velocity.
   std::optional<Pose> predict(Stamp stamp) const;
 
+  /// Up in the body frame, and the velocity of the body (m/s, rad/s; body axes) by the last two poses.
+  Eigen::Vector3d up_in_body() const;
+  Vector6d body_velocity() const;
+
   /// The vertical of the world where no sensor measures it, e.g. the normal of the ground in the first images. Call
   /// before the first frame.
   void align_with_ground(const Eigen::Vector3d& up_in_body);

@@ -15,6 +15,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/system/internal/exposure_stage.h"
 #include "spartan/system/internal/pipeline_state.h"
 #include "spartan/system/internal/queued_stream.h"
 #include "spartan/system/internal/run_loop.h"
@@ -274,8 +275,16 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
     source.queue->record_with(std::move(*recorded));
   }
   SampleStream& live = source.queue ? *source.queue : source.stream;
+  std::optional<ExposureStage> exposure;
+  if (live.control() != nullptr && options.exposure.enabled) {
+    auto created =
+        ExposureStage::create(rig, options.exposure, std::filesystem::path(info.rig_source).parent_path().string(),
+                              *live.control(), hooks.log);
+    if (!created) return failure(created);
+    exposure.emplace(std::move(*created));
+  }
   const RunStream stream{resumed ? *resumed : live, source.recording, resumed ? &*resumed : nullptr,
-                         source.queue ? source.queue->recorder() : nullptr};
+                         source.queue ? source.queue->recorder() : nullptr, exposure ? &*exposure : nullptr};
   RunLoop run_loop(request, hooks, stream, std::move(setup->pipeline), std::move(*recorder), start.time, start.cpu_s);
   if (Status s = run_loop.begin(); !s) return failure(s);
   const Status processed = run_loop.process_samples();
@@ -302,6 +311,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
       return failure(s);
   }
   RunFacts facts = facts_of(request, source, options, run_loop);
+  if (facts.live && exposure) facts.live->exposure = exposure->statistics();
   facts.level_by_ground = setup->ground_up.has_value();
   auto outcome = write_results(run_loop, resolved, workers, folder, std::move(facts), hooks.log);
   if (outcome) outcome->lock = std::move(prepared->lock);

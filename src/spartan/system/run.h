@@ -45,7 +45,7 @@ struct RunProgress {
 struct RunHooks {
   Log log;
   std::function<void(const RunProgress&)> progress;  ///< after each frame
-  std::function<bool()> should_stop;                 ///< between samples
+  std::function<bool()> should_stop;                 ///< asked before each sample; a recorded run ends with a frame
   /// The localization at the newest sample: after each sample of the IMU and each frame.
   std::function<void(const LocalizationEstimate&)> estimate;
   std::function<void(const FrameRecord&)> frame;  ///< each frame of the odometry pair, missing ones included

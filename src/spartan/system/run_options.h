@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "spartan/core/options.h"
+#include "spartan/imaging/exposure_control.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/localization/localization_options.h"
 #include "spartan/odometry/odometer.h"
@@ -141,6 +142,7 @@ struct RunOptions {
   LocalizationOptions localization;
   bool smoothed_trajectory = true;  ///< run(): smooth the localization after the last frame
   TerrainOptions terrain;
+  ExposureOptions exposure;  ///< of live cameras
   CommitOptions commit;
 
   template <class Visitor>
@@ -187,6 +189,7 @@ struct RunOptions {
             "(trajectory_smoothed.tum); false saves the time and the memory for it (1 kB for each frame, 60 bytes for "
             "each sample of the IMU).");
     v.group("terrain", terrain);
+    v.group("exposure", exposure);
     v.group("commit", commit);
   }
 };

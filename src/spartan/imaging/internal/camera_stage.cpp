@@ -37,7 +37,8 @@ void keep_where(ImageView<std::uint8_t> pixels, ImageView<const std::uint8_t> ma
   }
 }
 
-// Reads the self-mask as 0 or 255; empty where the camera has none.
+}  // namespace
+
 Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::string& folder) {
   if (camera.self_mask.empty()) return Image<std::uint8_t>();
   const std::string path = (std::filesystem::path(folder) / camera.self_mask).string();
@@ -57,8 +58,6 @@ Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::stri
   }
   return mask;
 }
-
-}  // namespace
 
 CameraStage::CameraStage(const Camera& camera, const ImagingOptions& options)
     : camera_(camera), debayerer_(options.debayer), mapped_(camera.size) {

@@ -19,6 +19,10 @@
 
 namespace spartan::internal {
 
+/// The self-mask of a camera as 0 or 255; empty where it has none. Code `configuration`: it cannot be read or has not
+/// the camera's size.
+Result<Image<std::uint8_t>> load_self_mask(const Camera& camera, const std::string& folder);
+
 /// Buffers and lookup tables of one camera. The steps must be called in the order of their declaration, but rectify()
 /// before apply_contrast() where rectifies_first(); the views of the result are valid until the next image.
 class CameraStage {

@@ -29,6 +29,7 @@ class QueuedStream : public SampleStream {
   /// Only after the end.
   DiscardedSamples discarded() const override { return stream_.discarded(); }
   void start_after(Stamp stamp) override { stream_.start_after(stamp); }
+  CameraControl* control() override { return stream_.control(); }
   std::size_t previews(const std::string& pair) const override { return stream_.previews(pair); }
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
     return stream_.preview(pair, index);

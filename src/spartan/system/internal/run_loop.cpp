@@ -109,6 +109,8 @@ Status RunLoop::process_samples() {
   const Status processed = process_until_end();
   if (processed && !complete_ && frames_ > 0) {
     RunResult last;
+    last.step.times = take_stage_times();
+    last.step.localization_inputs = pipeline_.take_localization_inputs();
     add_checkpoint(last);
     if (Status added = recorder_->add(std::move(last)); !added) return added;
   }
@@ -119,7 +121,9 @@ Status RunLoop::process_samples() {
 
 Status RunLoop::process_until_end() {
   while (request_.max_frames == 0 || frames_ < request_.max_frames) {
-    if (hooks_.should_stop && hooks_.should_stop()) {
+    // What a recorded run has computed since its last frame is stored with the next one, resumed or not.
+    const bool can_stop = !recording_ || after_frame_;
+    if (hooks_.should_stop && hooks_.should_stop() && can_stop) {
       stopped_ = true;
       return {};
     }
@@ -130,6 +134,7 @@ Status RunLoop::process_until_end() {
     ++samples_taken_;
     arrived_ = read->arrived;
     if (!recording_) last_stamps_[source_of(*read->sample)] = stamp_of(*read->sample);
+    after_frame_ = false;
     front_end_.begin("front end");
     Status status = process(*read->sample);
     front_end_.end(nullptr);
@@ -191,6 +196,7 @@ Status RunLoop::process(const Sample& sample) {
 }
 
 Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) {
+  if (exposure_ && !catching_up_) exposure_->update(frame, pipeline_.up_in_body(), pipeline_.body_velocity());
   const bool at_stop = pipeline_.maps_a_stop();
   auto result = pipeline_.add(frame);
   if (!result) {
@@ -265,6 +271,7 @@ Status RunLoop::record(RunResult result) {
   report_estimate();
   if (resumed_ && !resumed_from_frame_) resumed_from_frame_ = frame.frame_id;
   ++frames_;
+  after_frame_ = true;
   if (frame.has_pose) {
     const Eigen::Vector3d& position = frame.world_from_body.pose.translation();
     if (last_position_) distance_m_ += (position - *last_position_).norm();

@@ -15,6 +15,7 @@
 #include "spartan/camera/sample_stream.h"
 #include "spartan/core/result.h"
 #include "spartan/core/stage_clock.h"
+#include "spartan/system/internal/exposure_stage.h"
 #include "spartan/system/internal/latency_record.h"
 #include "spartan/system/internal/resumed_stream.h"
 #include "spartan/system/internal/run_recorder.h"
@@ -32,6 +33,7 @@ struct RunStream {
   Recording* recording;      ///< the samples, if they are recorded; null: live
   ResumedStream* resumed;    ///< the samples, if the run is live and is resumed
   StreamRecorder* recorder;  ///< that records a live stream
+  ExposureStage* exposure;   ///< null: the cameras are not controlled
 };
 
 /// Feeds the samples of a stream to the pipeline and its results to the recorder, and now and then the state of the
@@ -47,6 +49,7 @@ class RunLoop {
         recording_(stream.recording),
         resumed_stream_(stream.resumed),
         stream_recorder_(stream.recorder),
+        exposure_(stream.exposure),
         recorder_(std::move(recorder)),
         pipeline_(std::move(pipeline)),
         start_(start),
@@ -96,6 +99,7 @@ class RunLoop {
   Recording* recording_;  // null: live
   ResumedStream* resumed_stream_;
   StreamRecorder* stream_recorder_;
+  ExposureStage* exposure_;
   std::map<std::string, Stamp> last_stamps_;  // of a live stream, by source_of()
   std::unique_ptr<RunRecorder> recorder_;
   Pipeline pipeline_;  // reads map tiles through the recorder
@@ -116,6 +120,7 @@ class RunLoop {
   std::string first_error_;
   std::chrono::steady_clock::time_point arrived_;  // of the sample that is processed
   LatencyRecord latencies_;
+  bool after_frame_ = true;  // nothing was processed since the last frame of the odometry pair
   bool stopped_ = false;
   bool catching_up_ = false;  // with what a resumed live run had recorded
   bool complete_ = false;

@@ -72,6 +72,15 @@ Json recording(const std::optional<RecorderProgress>& progress) {
           {"error", progress->status ? Json(nullptr) : Json(progress->status.error().message())}};
 }
 
+// Null where the cameras are not controlled.
+Json exposure(const std::optional<ExposureStatistics>& statistics) {
+  if (!statistics) return nullptr;
+  return {{"frames", statistics->frames},
+          {"changes", statistics->changes},
+          {"saturated_frames", statistics->saturated_frames},
+          {"dark_frames", statistics->dark_frames}};
+}
+
 // Null of a recording.
 Json live(const std::optional<LiveFacts>& facts) {
   if (!facts) return nullptr;
@@ -84,7 +93,8 @@ Json live(const std::optional<LiveFacts>& facts) {
             {"sensor_samples", facts->dropped.sensor_samples}}},
           {"queue_peak_bytes", facts->queue_peak_bytes},
           {"files_discarded", facts->files_discarded},
-          {"recording", recording(facts->recording)}};
+          {"recording", recording(facts->recording)},
+          {"exposure", exposure(facts->exposure)}};
 }
 
 // Consecutive frames without a pose.

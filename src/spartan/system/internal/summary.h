@@ -8,6 +8,7 @@
 
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/time.h"
+#include "spartan/system/internal/exposure_stage.h"
 #include "spartan/system/internal/latency_record.h"
 #include "spartan/system/internal/sample_queue.h"
 #include "spartan/system/run_store.h"
@@ -19,8 +20,9 @@ struct LiveFacts {
   LatencyRecord latencies;
   DroppedFrames dropped;
   std::size_t queue_peak_bytes = 0;
-  std::int64_t files_discarded = 0;           ///< terrain views and maps whose files the disk was too slow for
-  std::optional<RecorderProgress> recording;  ///< of the stream, if it was recorded
+  std::int64_t files_discarded = 0;              ///< terrain views and maps whose files the disk was too slow for
+  std::optional<RecorderProgress> recording;     ///< of the stream, if it was recorded
+  std::optional<ExposureStatistics> exposure{};  ///< of cameras that are controlled
 };
 
 /// Facts about a run that are not in its store.

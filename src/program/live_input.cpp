@@ -1,0 +1,42 @@
+#include "program/live_input.h"
+
+#include <string_view>
+
+#include "program/simulation.h"
+
+namespace spartan::program {
+namespace {
+
+constexpr std::string_view kSimulation = "sim:";
+
+}  // namespace
+
+void add_live_options(CLI::App& command, LiveArguments& arguments) {
+  command
+      .add_option("--speed", arguments.options.speed,
+                  "Pace of a replay or simulation, relative to that of its stamps (default 1); raising it leaves less "
+                  "time for each frame.")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--passes", arguments.options.passes, "How often a replay plays its recording (default 1).")
+      ->check(CLI::PositiveNumber);
+  command
+      .add_option("--set-scenario", arguments.scenario_keys,
+                  "Of a simulation: set one key of the scenario, e.g. rover=ordinary. Repeatable, in this order.")
+      ->allow_extra_args(false)
+      ->option_text("KEY=VALUE");
+}
+
+bool is_live_input(const std::string& input) {
+  return input.starts_with(kSimulation) || is_live_address(input);
+}
+
+Result<std::unique_ptr<SampleStream>> open_live_input(const Context& context, const std::string& address,
+                                                      const OpenOptions& open, const LiveArguments& arguments) {
+  if (!address.starts_with(kSimulation)) return open_live_stream(address, open, arguments.options);
+  SimulationArguments simulation;
+  simulation.scenario = address.substr(kSimulation.size());
+  simulation.set = arguments.scenario_keys;
+  return open_simulation(context, simulation, arguments.options.speed);
+}
+
+}  // namespace spartan::program
