@@ -15,9 +15,10 @@ constexpr double kHorizon_rad = 0.05;  // 3°
 constexpr double kLeastGround = 0.05;  // share of the probes
 constexpr int kBins = 1024;
 constexpr double kHighQuantile = 0.98;
-// Where the high quantile is saturated, the brightness that it would have is unknown: taken for 1.5 × full scale; for a
-// saturated median 5 ×. A factor that is too small or too large in one step is followed by another step.
-constexpr double kSaturated = 0.995, kBeyondHigh = 1.5, kBeyondMedian = 5;
+// Where the high quantile is saturated, the brightness that it would have is unknown: taken for 1.5 × full scale. That
+// of a saturated median follows from the share s > ½ of saturated pixels, 1 + (s − ½); 5 where hardly any pixel is not
+// saturated. A factor that is too small or too large in one step is followed by another step.
+constexpr double kSaturated = 0.995, kBeyondHigh = 1.5, kBeyondMedian = 5, kAllSaturated = 0.99;
 constexpr double kLargestFactor = 16;
 constexpr double kNearest_m = 1;          // where the rig does not state it
 constexpr double kLeastMedian = 1.0 / 3;  // of the level, where highlights would be saturated
@@ -110,7 +111,9 @@ GroundBrightness GroundMeter::measure(const StereoFrame& frame, const Eigen::Vec
 
 double ExposureControl::brightness_factor(const GroundBrightness& ground) const {
   const double level = 0.01 * options_.level_percent, ceiling = 0.01 * options_.highlight_percent;
-  const double median = ground.median >= kSaturated ? kBeyondMedian : ground.median;
+  double median = ground.median;
+  if (median >= kSaturated)
+    median = ground.saturated >= kAllSaturated ? kBeyondMedian : 1 + std::max(0.0, ground.saturated - 0.5);
   const double high = std::max(median, ground.high >= kSaturated ? kBeyondHigh : ground.high);
   const double by_median = level / median, by_high = ceiling / high;
   return std::min(std::max(std::min(by_median, by_high), kLeastMedian * by_median), kLargestFactor);

@@ -97,7 +97,8 @@ class Pipeline {
   /// After an error the state is as before the call: the next frame, or the same frame again, may be added.
   /// Codes: `frame_rejected` (the images do not fit the rig, the rig has no such pair, or an image equals the previous
   /// one of its camera bit for bit, which the noise of a sensor excludes; images with one value in all pixels are
-  /// exempt; at Pace::live, a view of a stop while as many as `kMostViews` wait for the back end), `store_damaged` (a
+  /// exempt; at Pace::live, a view of a stop while as many as `kMostViews` views or `kMostStops` stops wait for
+  /// the back end), `store_damaged` (a
   /// map tile cannot be read).
   Result<std::optional<FrameResult>> add(const StereoFrame& frame);
 
@@ -173,6 +174,8 @@ class Pipeline {
  private:
   /// Views of stops that may wait for the back end at Pace::live.
   static constexpr int kMostViews = 12;
+  /// Stops that the rover has left and whose maps may wait to be made or applied: tens of MB each.
+  static constexpr int kMostStops = 4;
 
   struct State;
   explicit Pipeline(std::unique_ptr<State> state);

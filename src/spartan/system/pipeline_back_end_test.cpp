@@ -171,5 +171,23 @@ TEST(PipelineBackEnd, LiveViewsAreDroppedWhereTooManyWait) {
   EXPECT_TRUE(drive_narrow_to(pipeline, 1)) << "frames of the odometry are never dropped";
 }
 
+// The points of a stop take tens of MB until its map is applied.
+TEST(PipelineBackEnd, LiveViewsAreDroppedWhereTooManyStopsWait) {
+  RunOptions options = with_delay();
+  options.stop_delay_frames = 1000;
+  Pipeline pipeline = Pipeline::create(mapping_rover(), options, ThreadPool(1), {}, Pace::live).value();
+  int views = 0;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_TRUE(pipeline.add(view_at("narrow", 0, i, 2.0 * i))) << "frames of the odometry are never dropped";
+    const StereoFrame view = view_at("wide", 0, i, 2.0 * i + 1);
+    const auto result = pipeline.add(view);
+    views += result.has_value();
+    if (!result) {
+      EXPECT_EQ(pipeline.fault_of(view), FrameFault::dropped);
+    }
+  }
+  EXPECT_EQ(views, 4);
+}
+
 }  // namespace
 }  // namespace spartan

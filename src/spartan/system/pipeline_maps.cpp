@@ -43,7 +43,7 @@ Status Pipeline::State::add_odometry_frame(const StereoFrame& frame, const Recti
 Status Pipeline::State::add_view(const StereoFrame& frame) {
   if (!maps_stops || frame.position_id < 0) return {};
   const StereoPair& of = *rig.find_pair(frame.pair);
-  view_was_dropped = pace == Pace::live && back_end.backlog() >= kMostViews;
+  view_was_dropped = pace == Pace::live && (back_end.backlog() >= kMostViews || stop_stage.departed() >= kMostStops);
   if (view_was_dropped) {
     return failure(ErrorCode::frame_rejected, "dropped: the back end has not computed the views before",
                    fmt::format("frame {} of pair '{}'", frame.frame_id, frame.pair));

@@ -50,7 +50,8 @@ struct RunHooks {
   std::function<void(const LocalizationEstimate&)> estimate;
   std::function<void(const FrameRecord&)> frame;  ///< each frame of the odometry pair, missing ones included
   std::function<void(const MappedStop&)> map;     ///< each map that was applied
-  /// Called once, by another thread, where a stage takes longer than RunRequest::watchdog_s: the run does not end by
+  /// Called once, by another thread, where a stage takes longer than RunRequest::watchdog_s (of the back end: ten times
+  /// as long): the run does not end by
   /// itself, so this function should end the process.
   std::function<void(const std::string& stage, double seconds)> hung;
 };

@@ -35,6 +35,7 @@ class LiveSimulation : public SampleStream, public CameraControl {
   /// The pan-tilt units look there, instead of where the plan of the drive says.
   void set_angles(const PlannedAngles& angles);
 
+  const SimulationRequest& request() const { return *request_; }
   const FrameSimulator& frames() const { return simulator_; }
 
  private:

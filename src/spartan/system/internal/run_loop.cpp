@@ -16,6 +16,8 @@ namespace {
 // Length of the interval from the first IMU sample that initializes gravity if no sample comes before the first frame:
 // a recording often starts its camera and its IMU together, while the rover is stationary. Empirical.
 constexpr double kAlignmentSeconds = 1;
+// The back end has the lowest priority: beside other programs that use all cores it gets some percent of one.
+constexpr double kBackEndPatience = 10;
 // A live run looks so often whether it should stop.
 constexpr std::chrono::milliseconds kStopPoll{50};
 
@@ -103,8 +105,11 @@ Status RunLoop::process_samples() {
   std::optional<Watchdog> watchdog;
   if (request_.watchdog_s > 0 && hooks_.hung) {
     pipeline_.show_stages_in(front_end_);
-    const std::vector<const RunningStage*> watched{&front_end_, &pipeline_.back_end_stage(), &recorder_->running()};
-    watchdog.emplace(watched, request_.watchdog_s, hooks_.hung);
+    const double limit_s = request_.watchdog_s;
+    watchdog.emplace(std::vector<WatchedStage>{{&front_end_, limit_s},
+                                               {&pipeline_.back_end_stage(), kBackEndPatience * limit_s},
+                                               {&recorder_->running(), limit_s}},
+                     hooks_.hung);
   }
   const Status processed = process_until_end();
   if (processed && !complete_ && frames_ > 0) {

@@ -66,6 +66,8 @@ class StopStage {
   void undo_departure() { stops_.back().departed = false; }
 
   bool has_departed() const { return oldest() != nullptr; }
+  /// Number of stops that the rover has left and whose maps are not applied.
+  int departed() const { return static_cast<int>(stops_.size()) - (current() != nullptr ? 1 : 0); }
   /// Whether the match of the oldest departed stop is still to be started.
   bool is_unmatched() const { return has_departed() && oldest()->match == nullptr; }
   /// The prior pose of the map of the oldest stop, departed or not.

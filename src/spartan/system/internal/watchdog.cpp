@@ -5,8 +5,8 @@
 
 namespace spartan::internal {
 
-Watchdog::Watchdog(std::vector<const RunningStage*> watched, double limit_s, Hung hung)
-    : watched_(std::move(watched)), limit_s_(limit_s), hung_(std::move(hung)), thread_([this] { run(); }) {}
+Watchdog::Watchdog(std::vector<WatchedStage> watched, Hung hung)
+    : watched_(std::move(watched)), hung_(std::move(hung)), thread_([this] { run(); }) {}
 
 Watchdog::~Watchdog() {
   {
@@ -20,10 +20,10 @@ Watchdog::~Watchdog() {
 void Watchdog::run() {
   std::unique_lock lock(mutex_);
   while (!changed_.wait_for(lock, std::chrono::milliseconds(100), [this] { return ended_; })) {
-    for (const RunningStage* running : watched_) {
-      const char* stage = running->stage();
-      const double seconds = running->seconds();
-      if (stage == nullptr || seconds < limit_s_) continue;
+    for (const WatchedStage& watched : watched_) {
+      const char* stage = watched.stage->stage();
+      const double seconds = watched.stage->seconds();
+      if (stage == nullptr || seconds < watched.limit_s) continue;
       hung_(stage, seconds);
       return;
     }

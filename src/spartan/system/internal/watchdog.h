@@ -12,13 +12,18 @@
 
 namespace spartan::internal {
 
-/// A thread that looks at the stages of others ten times a second. Where one runs for longer than `limit_s`, it calls
+/// What a watchdog looks at. Borrowed.
+struct WatchedStage {
+  const RunningStage* stage;
+  double limit_s;  ///< longest time that it may run
+};
+
+/// A thread that looks at the stages of others ten times a second. Where one runs for longer than its limit, it calls
 /// `hung` with the name of the stage and its time, once.
 class Watchdog {
  public:
   using Hung = std::function<void(const std::string& stage, double seconds)>;
-  /// `watched` is borrowed.
-  Watchdog(std::vector<const RunningStage*> watched, double limit_s, Hung hung);
+  Watchdog(std::vector<WatchedStage> watched, Hung hung);
   ~Watchdog();
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
@@ -26,8 +31,7 @@ class Watchdog {
  private:
   void run();
 
-  std::vector<const RunningStage*> watched_;
-  double limit_s_;
+  std::vector<WatchedStage> watched_;
   Hung hung_;
   std::mutex mutex_;
   std::condition_variable changed_;

@@ -18,7 +18,7 @@ TEST(Watchdog, NamesTheStageThatHangs) {
   std::atomic<int> calls = 0;
   std::string named;
   double after_s = 0;
-  const Watchdog watchdog({&front_end, &back_end}, 0.3, [&](const std::string& stage, double seconds) {
+  const Watchdog watchdog({{&front_end, 0.15}, {&back_end, 0.3}}, [&](const std::string& stage, double seconds) {
     named = stage;
     after_s = seconds;
     ++calls;
@@ -39,7 +39,7 @@ TEST(Watchdog, IsSilentWhereNothingHangs) {
   RunningStage stage;
   std::atomic<int> calls = 0;
   {
-    const Watchdog watchdog({&stage}, 0.25, [&](const std::string&, double) { ++calls; });
+    const Watchdog watchdog({{&stage, 0.25}}, [&](const std::string&, double) { ++calls; });
     StageClock clock;
     clock.show_in(stage);
     for (int i = 0; i < 4; ++i) {
