@@ -1,4 +1,5 @@
-// SampleStream: stereo frames and sensor samples in order of arrival, from a recording or from sensors that run now.
+// SampleStream: stereo frames and sensor samples in order of arrival, from a recording or from sensors that run now, and
+// control of these sensors.
 #pragma once
 
 #include <chrono>
@@ -61,7 +62,40 @@ class CameraControl {
   virtual ~CameraControl() = default;
   /// Of both cameras of a pair.
   virtual Status set_exposure(const std::string& pair, const ExposureSettings& settings) = 0;
+  /// Takes one frame now, beside those that the cameras take by themselves. Code `configuration`: they cannot.
+  virtual Status trigger(const std::string& pair) = 0;
 };
+
+/// As in the rig: pan positive to the left, tilt positive downwards.
+struct PanTiltAngles {
+  double pan_rad = 0, tilt_rad = 0;
+};
+
+/// Where a pan-tilt unit is.
+struct PanTiltReading {
+  PanTiltAngles angles;
+  bool moves = false;  ///< it is not yet where move_to() has sent it
+};
+
+/// A pan-tilt unit that runs now.
+class PanTiltControl {
+ public:
+  virtual ~PanTiltControl() = default;
+  /// Begins a motion; it need not have ended before the next one begins. Codes: `input` (beyond the limits of the
+  /// unit), `read_error` (the unit does not answer, or refuses).
+  virtual Status move_to(const PanTiltAngles& angles) = 0;
+  /// Code `read_error`: the unit does not answer, or it no longer goes where it was sent, as after a loss of power.
+  /// move_to() may be tried again.
+  virtual Result<PanTiltReading> read() = 0;
+  /// Standard deviation of the angles of a unit that has ended its motion, rad.
+  virtual double sigma_rad() const = 0;
+};
+
+/// Opens `flir:DEVICE`, a unit by FLIR or Directed Perception with their ASCII protocol at a serial line, 9600 baud;
+/// `flir:DEVICE?baud=115200&pan=1&tilt=1`: another rate, axes that count to the other side (positions count to the
+/// right and upwards by default). Codes: `usage` (no such address), `read_error` (no such device, or it does not
+/// answer).
+Result<std::unique_ptr<PanTiltControl>> open_pan_tilt(const std::string& address);
 
 /// Samples in order of arrival. A recording yields them ordered by stamp; from a live stream they arrive late and out
 /// of order between sensors, in order within each.
@@ -79,6 +113,8 @@ class SampleStream {
 
   /// Null where the cameras cannot be controlled. Borrowed.
   virtual CameraControl* control() { return nullptr; }
+  /// The pan-tilt unit behind the stream; null where there is none. Borrowed.
+  virtual PanTiltControl* pan_tilt() { return nullptr; }
 
   /// Before the first call of read(): a stream that can begin anywhere begins after this stamp.
   virtual void start_after(Stamp /*stamp*/) {}
