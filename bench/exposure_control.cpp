@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -132,7 +133,8 @@ Drive drive(const Event& event, double delay_ms, bool controlled) {
   Drive result;
   Pose first_body, last_body, first_true, last_true;
   double path_m = 0;
-  for (auto read = live.read({}); read && read->sample; read = live.read({})) {
+  const auto next = [&] { return live.read(std::chrono::nanoseconds(0)); };
+  for (auto read = next(); read && read->sample; read = next()) {
     const auto* frame = std::get_if<StereoFrame>(&*read->sample);
     if (frame == nullptr) continue;
     const double time_s = live.request().drive.frames()[static_cast<std::size_t>(frame->frame_id)].time_s;

@@ -75,4 +75,12 @@ std::string map_message(const MappedStop& stop) {
   return line_of(json);
 }
 
+std::string panorama_message(const PanoramaEvent& event) {
+  Json json = message("panorama", event.stamp);
+  json["state"] = event.begins ? "begins" : "ended";
+  json["position_id"] = event.position_id;
+  json["views"] = event.views;
+  return line_of(json);
+}
+
 }  // namespace spartan::program

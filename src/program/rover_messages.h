@@ -5,6 +5,7 @@
 
 #include "spartan/localization/localizer.h"
 #include "spartan/system/pipeline.h"
+#include "spartan/system/run.h"
 #include "spartan/system/run_store.h"
 
 namespace spartan::program {
@@ -15,5 +16,7 @@ std::string pose_message(const LocalizationEstimate& estimate);
 std::string health_message(const FrameRecord& frame);
 /// `type` "map": the map of a stop or keyframe that was applied; its file is written afterwards.
 std::string map_message(const MappedStop& stop);
+/// `type` "panorama": one begins or has ended.
+std::string panorama_message(const PanoramaEvent& event);
 
 }  // namespace spartan::program

@@ -9,6 +9,7 @@
 
 #include "program/calibration_advice.h"
 #include "program/commands.h"
+#include "program/control_lines.h"
 #include "program/interrupt.h"
 #include "program/json.h"
 #include "program/live_input.h"
@@ -36,6 +37,8 @@ struct RunArguments {
   bool resume = false, odometry_only = false;
   int max_frames = 0;
   LiveArguments live;
+  std::string pan_tilt, control;
+  double panorama_every_m = 0;
   std::string publish, record_images = "pnm";
   bool no_recording = false;
   double watchdog_s = kWatchdog_s;
@@ -52,17 +55,19 @@ Result<std::unique_ptr<Publisher>> open_publisher(const RunArguments& arguments,
   return publisher;
 }
 
-// Borrows the publisher, which may be null.
-RunHooks live_hooks(const Context& context, Progress& progress, Publisher* publisher) {
+// Borrows the publisher and the control lines, which may be null.
+RunHooks live_hooks(const Context& context, Progress& progress, Publisher* publisher, ControlLines* control) {
   RunHooks hooks = run_hooks(context, progress);
   hooks.hung = [log = context.log](const std::string& stage, double seconds) {
     log.error(fmt::format("stage '{}' has not ended for {:.1f} s; the run ends", stage, seconds));
     std::_Exit(kInternalFault);
   };
+  if (control != nullptr) hooks.command = [control] { return control->next(); };
   if (publisher == nullptr) return hooks;
   hooks.estimate = [publisher](const LocalizationEstimate& estimate) { publisher->publish(pose_message(estimate)); };
   hooks.frame = [publisher](const FrameRecord& frame) { publisher->publish(health_message(frame)); };
   hooks.map = [publisher](const MappedStop& stop) { publisher->publish(map_message(stop)); };
+  hooks.panorama = [publisher](const PanoramaEvent& event) { publisher->publish(panorama_message(event)); };
   return hooks;
 }
 
@@ -139,6 +144,8 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   request.max_frames = arguments.max_frames;
   request.version = SPARTAN_VERSION;
   if (is_live_input(arguments.input)) request.watchdog_s = arguments.watchdog_s;
+  request.pan_tilt = arguments.pan_tilt;
+  if (arguments.panorama_every_m > 0) request.options.panorama.every_m = arguments.panorama_every_m;
   request.record = !arguments.no_recording;
   request.recorded_images = image_files_of(arguments.record_images);
 
@@ -148,7 +155,11 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   }
   auto publisher = open_publisher(arguments, context);
   if (!publisher) return failure(publisher);
-  auto outcome = run_input(context, arguments, request, live_hooks(context, progress, publisher->get()));
+  auto control = arguments.control.empty() ? Result<std::unique_ptr<ControlLines>>()
+                                           : ControlLines::open(arguments.control, context.log);
+  if (!control) return failure(control);
+  auto outcome =
+      run_input(context, arguments, request, live_hooks(context, progress, publisher->get(), control->get()));
   if (!outcome) return failure(outcome);
   std::string text = run_summary_text(outcome->summary_json, arguments.output);
   if (!arguments.truth.empty() && !outcome->interrupted) {
@@ -224,6 +235,18 @@ void add_run(CLI::App& app, Context& context) {
       "--publish", a->publish,
       "Publish poses at the rate of the IMU, health and maps as JSON lines: to - (standard output, without the "
       "summary), to a FIFO, to tcp:PORT of this computer, or to tcp:ADDRESS:PORT (default: nowhere).");
+  command
+      ->add_option(
+          "--panorama-every", a->panorama_every_m,
+          "Of a live run: take a panorama each time that the rover is stationary and has driven so many metres "
+          "since the last one (default: panorama.every_m of the options).")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--pan-tilt", a->pan_tilt,
+                      "Of a live run: the pan-tilt unit, flir:DEVICE (default: that of a simulation).");
+  command->add_option(
+      "--control", a->control,
+      "Of a live run: a FIFO, created if there is none, whose lines are commands: panorama takes one as "
+      "soon as the rover is stationary, stop ends the run.");
   command->add_flag("--no-recording", a->no_recording,
                     "Of a live run: do not record the stream in the folder `live` of the run.");
   add_recorded_images_option(*command, a->record_images);

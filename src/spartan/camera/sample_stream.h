@@ -1,5 +1,5 @@
-// SampleStream: stereo frames and sensor samples in order of arrival, from a recording or from sensors that run now, and
-// control of these sensors.
+// SampleStream: stereo frames and sensor samples in order of arrival, from a recording or from sensors that run now,
+// and control of these sensors.
 #pragma once
 
 #include <chrono>

@@ -16,6 +16,7 @@
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/system/internal/exposure_stage.h"
+#include "spartan/system/internal/panorama.h"
 #include "spartan/system/internal/pipeline_state.h"
 #include "spartan/system/internal/queued_stream.h"
 #include "spartan/system/internal/run_loop.h"
@@ -41,6 +42,7 @@ struct RunSource {
   SampleStream& stream;
   Recording* recording;  // the stream, if it is one; null: live
   QueuedStream* queue;   // through which a live stream is read
+  Panorama* panorama;    // null: there are none
 
   Pace pace() const { return recording ? Pace::recorded : Pace::live; }
 };
@@ -283,8 +285,9 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
     if (!created) return failure(created);
     exposure.emplace(std::move(*created));
   }
-  const RunStream stream{resumed ? *resumed : live, source.recording, resumed ? &*resumed : nullptr,
-                         source.queue ? source.queue->recorder() : nullptr, exposure ? &*exposure : nullptr};
+  const RunStream stream{resumed ? *resumed : live,       source.recording,
+                         resumed ? &*resumed : nullptr,   source.queue ? source.queue->recorder() : nullptr,
+                         exposure ? &*exposure : nullptr, source.panorama};
   RunLoop run_loop(request, hooks, stream, std::move(setup->pipeline), std::move(*recorder), start.time, start.cpu_s);
   if (Status s = run_loop.begin(); !s) return failure(s);
   const Status processed = run_loop.process_samples();
@@ -318,6 +321,19 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   return outcome;
 }
 
+// Null where none is wanted. `unit`: null is that of the stream.
+Result<std::unique_ptr<Panorama>> panorama_of(SampleStream& stream, PanTiltControl* unit, const RunRequest& request,
+                                              const RunHooks& hooks) {
+  const bool wanted = request.options.panorama.every_m > 0;
+  if (unit == nullptr) unit = stream.pan_tilt();
+  if (unit == nullptr && wanted) {
+    return failure(ErrorCode::usage, "has no pan-tilt unit, which a panorama needs", stream.info().path,
+                   "name one with --pan-tilt");
+  }
+  if (unit == nullptr || (!wanted && !hooks.command)) return nullptr;
+  return Panorama::create(stream.info().rig, request.options.panorama, *unit, stream.control(), hooks);
+}
+
 // The last commit cannot notice that the store is removed while SQLite closes it.
 Result<RunOutcome> with_store(Result<RunOutcome> outcome, const std::string& store) {
   if (!outcome) return outcome;
@@ -337,7 +353,7 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
   try {
     const auto recording = open_recording(request.input, request.open);
     if (!recording) return failure(recording);
-    return with_store(run_source({**recording, recording->get(), nullptr}, start, request, hooks),
+    return with_store(run_source({**recording, recording->get(), nullptr, nullptr}, start, request, hooks),
                       RunFolder{request.output}.store());
   } catch (const std::bad_alloc& exception) {
     return tl::unexpected(out_of_memory(exception));
@@ -348,8 +364,16 @@ Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, con
   const RunStart start;
   const StereoPair* const odometry = odometry_pair_of(stream.info().rig, request.options);
   try {
-    QueuedStream queue(stream, odometry ? odometry->name : "", kQueueBytes);
-    return with_store(run_source({stream, nullptr, &queue}, start, request, hooks), RunFolder{request.output}.store());
+    auto unit = request.pan_tilt.empty() ? std::unique_ptr<PanTiltControl>() : open_pan_tilt(request.pan_tilt);
+    if (!unit) return failure(unit);
+    auto panorama = panorama_of(stream, unit->get(), request, hooks);
+    if (!panorama) return failure(panorama);
+    std::optional<PanoramaStream> labelled;
+    if (*panorama) labelled.emplace(stream, **panorama);
+    SampleStream& samples = labelled ? *labelled : stream;
+    QueuedStream queue(samples, odometry ? odometry->name : "", kQueueBytes);
+    return with_store(run_source({samples, nullptr, &queue, panorama->get()}, start, request, hooks),
+                      RunFolder{request.output}.store());
   } catch (const std::bad_alloc& exception) {
     return tl::unexpected(out_of_memory(exception));
   }

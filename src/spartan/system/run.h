@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "spartan/camera/recording.h"
@@ -31,6 +32,8 @@ struct RunRequest {
   bool record = false;  ///< run_live(): record the stream in the run folder
   ImageFiles recorded_images = ImageFiles::pnm;
   double watchdog_s = 0;  ///< see RunHooks::hung; 0: no watchdog
+  /// run_live(): address of the pan-tilt unit, see open_pan_tilt(); empty: that of the stream, if it has one.
+  std::string pan_tilt;
   std::string version;
 };
 
@@ -42,14 +45,30 @@ struct RunProgress {
 };
 
 /// Callbacks of a run, called by the thread that called run(). Each may be empty.
+/// What the rover's computer can ask of a live run.
+enum class RunCommand {
+  panorama,  ///< take one as soon as the rover is stationary
+  stop,      ///< end the run, as RunHooks::should_stop does
+};
+
+/// The begin or the end of a panorama; the rover should be stationary in between.
+struct PanoramaEvent {
+  bool begins = false;
+  std::int64_t position_id = 0;
+  Stamp stamp;    ///< of the latest frame of the stream
+  int views = 0;  ///< at its end: the frames that were taken
+};
+
 struct RunHooks {
   Log log;
   std::function<void(const RunProgress&)> progress;  ///< after each frame
   std::function<bool()> should_stop;                 ///< asked before each sample; a recorded run ends with a frame
   /// The localization at the newest sample: after each sample of the IMU and each frame.
   std::function<void(const LocalizationEstimate&)> estimate;
-  std::function<void(const FrameRecord&)> frame;  ///< each frame of the odometry pair, missing ones included
-  std::function<void(const MappedStop&)> map;     ///< each map that was applied
+  std::function<void(const FrameRecord&)> frame;       ///< each frame of the odometry pair, missing ones included
+  std::function<void(const MappedStop&)> map;          ///< each map that was applied
+  std::function<std::optional<RunCommand>()> command;  ///< asked between the samples of a live stream, until empty
+  std::function<void(const PanoramaEvent&)> panorama;  ///< called by another thread
   /// Called once, by another thread, where a stage takes longer than RunRequest::watchdog_s (of the back end: ten times
   /// as long): the run does not end by
   /// itself, so this function should end the process.

@@ -97,6 +97,41 @@ struct KeyframeOptions {
   }
 };
 
+/// Panoramas of a live run with a pan-tilt unit.
+struct PanoramaOptions {
+  double every_m = 0;  ///< m; path length from one to the next, the first at the start; 0: none
+  std::vector<double> pans_deg = {-35, 0, 35};  ///< deg; positive to the left
+  std::vector<double> tilts_deg;                ///< deg; positive downwards; empty: the rest angle of the unit
+  double settle_s = 0.3;                        ///< s; from the end of a motion to the exposure
+  double timeout_s = 30;                        ///< s; longest motion
+  double frame_timeout_s = 2;                   ///< s; longest time to wait for a frame
+
+  template <class Visitor>
+  void describe(Visitor& v) {
+    v.field(
+        "every_m", every_m,
+        "Path length in metres after which a live run takes a panorama as soon as the rover is stationary, the first "
+        "at the start; 0 takes none by itself. Raising it gives fewer maps.",
+        at_least(0));
+    v.field("pans_deg", pans_deg,
+            "Pan angles of a panorama in degrees, positive to the left; neighbouring views should overlap.",
+            between(-180, 180));
+    v.field(
+        "tilts_deg", tilts_deg,
+        "Tilt angles of a panorama in degrees, positive downwards, each with all pans; empty is the rest angle of the "
+        "unit.",
+        between(-90, 90));
+    v.field(
+        "settle_s", settle_s,
+        "Seconds from the end of a motion to the exposure, at least the time that an image takes to arrive; raising "
+        "it lets the mast stop swinging.",
+        between(0, 60));
+    v.field("timeout_s", timeout_s, "Seconds after which a motion of the unit has failed.", between(0.1, 600));
+    v.field("frame_timeout_s", frame_timeout_s, "Seconds after which a frame that was triggered is triggered again.",
+            between(0.1, 600));
+  }
+};
+
 /// When run() writes to the disk, on a thread of its own.
 struct CommitOptions {
   double every_s = 1;         ///< most seconds from a result to the end of its transaction
@@ -143,6 +178,7 @@ struct RunOptions {
   bool smoothed_trajectory = true;  ///< run(): smooth the localization after the last frame
   TerrainOptions terrain;
   ExposureOptions exposure;  ///< of live cameras
+  PanoramaOptions panorama;
   CommitOptions commit;
 
   template <class Visitor>
@@ -190,6 +226,7 @@ struct RunOptions {
             "each sample of the IMU).");
     v.group("terrain", terrain);
     v.group("exposure", exposure);
+    v.group("panorama", panorama);
     v.group("commit", commit);
   }
 };

@@ -19,7 +19,8 @@ PanTiltEmulator::PanTiltEmulator(double steps_per_second) : steps_per_second_(st
   axes_[0] = {0, 0, -3090, 3090};
   axes_[1] = {0, 0, -907, 604};
   master_ = ::posix_openpt(O_RDWR | O_NOCTTY);
-  if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0) throw std::runtime_error("no pseudo terminal");
+  if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0)
+    throw std::runtime_error("no pseudo terminal");
   device_ = ::ptsname(master_);
   // Raw, so that nothing is echoed before the other side is opened.
   const int slave = ::open(device_.c_str(), O_RDWR | O_NOCTTY);
@@ -147,8 +148,7 @@ void PanTiltEmulator::move() {
   const auto now = Clock::now();
   const double most = steps_per_second_ * std::chrono::duration<double>(now - moved_).count();
   moved_ = now;
-  for (Axis& axis : axes_)
-    axis.position += std::clamp(static_cast<double>(axis.target) - axis.position, -most, most);
+  for (Axis& axis : axes_) axis.position += std::clamp(static_cast<double>(axis.target) - axis.position, -most, most);
 }
 
 void PanTiltEmulator::send(const std::string& text) const {

@@ -77,7 +77,8 @@ Result<FlirAddress> parse_flir_address(const std::string& text) {
     } else if (key == "tilt" && is_sign) {
       address.tilt_sign = *value;
     } else {
-      return failure(ErrorCode::usage, "'" + part + "' is not possible", text, "use baud=RATE, pan=1, pan=-1, tilt=1 or tilt=-1");
+      return failure(ErrorCode::usage, "'" + part + "' is not possible", text,
+                     "use baud=RATE, pan=1, pan=-1, tilt=1 or tilt=-1");
     }
   }
   return address;
@@ -108,14 +109,16 @@ Result<std::string> FlirPanTilt::ask(const std::string& text, bool wants_number)
       const auto answer = answer_in(last, text);
       if (!answer) continue;
       if (answer->refused) {
-        return failure(ErrorCode::read_error, "the pan-tilt unit refuses '" + text + "': " + answer->text, line_.device());
+        return failure(ErrorCode::read_error, "the pan-tilt unit refuses '" + text + "': " + answer->text,
+                       line_.device());
       }
       if (wants_number ? last_number(answer->text).has_value() : answer->text.empty()) return answer->text;
     }
   }
-  return failure(ErrorCode::read_error,
-                 "the pan-tilt unit does not answer '" + text + "'" + (last.empty() ? "" : "; last line: '" + last + "'"),
-                 line_.device(), "check its power, the cable and the baud rate");
+  return failure(
+      ErrorCode::read_error,
+      "the pan-tilt unit does not answer '" + text + "'" + (last.empty() ? "" : "; last line: '" + last + "'"),
+      line_.device(), "check its power, the cable and the baud rate");
 }
 
 Status FlirPanTilt::command(const std::string& text) {
@@ -159,11 +162,11 @@ Result<long> FlirPanTilt::position_of(const Axis& axis, double angle_rad) const 
     return std::lround(steps);
   const double one = axis.sign * axis.step_rad * static_cast<double>(axis.least) / kDegree,
                other = axis.sign * axis.step_rad * static_cast<double>(axis.most) / kDegree;
-  return failure(ErrorCode::input,
-                 fmt::format("a {} of {:.1f} deg is beyond the limits of the pan-tilt unit, {:.1f} to {:.1f} deg",
-                             axis.name == 'P' ? "pan" : "tilt", angle_rad / kDegree, std::min(one, other),
-                             std::max(one, other)),
-                 line_.device());
+  return failure(
+      ErrorCode::input,
+      fmt::format("a {} of {:.1f} deg is beyond the limits of the pan-tilt unit, {:.1f} to {:.1f} deg",
+                  axis.name == 'P' ? "pan" : "tilt", angle_rad / kDegree, std::min(one, other), std::max(one, other)),
+      line_.device());
 }
 
 Status FlirPanTilt::move_to(const PanTiltAngles& angles) {

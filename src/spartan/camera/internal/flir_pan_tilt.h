@@ -45,7 +45,8 @@ class FlirPanTilt : public PanTiltControl {
   };
 
   FlirPanTilt(SerialLine line, const FlirAddress& address)
-      : line_(std::move(line)), axes_{Axis{'P', address.pan_sign, 0, 0, 0, 0}, Axis{'T', address.tilt_sign, 0, 0, 0, 0}} {}
+      : line_(std::move(line)),
+        axes_{Axis{'P', address.pan_sign, 0, 0, 0, 0}, Axis{'T', address.tilt_sign, 0, 0, 0, 0}} {}
 
   Status connect();
   Result<std::string> ask(const std::string& text, bool wants_number);

@@ -69,9 +69,7 @@ Result<SerialLine> SerialLine::open(const std::string& device, int baud) {
 }
 
 SerialLine::SerialLine(SerialLine&& other) noexcept
-    : device_(std::move(other.device_)),
-      file_(std::exchange(other.file_, -1)),
-      received_(std::move(other.received_)) {}
+    : device_(std::move(other.device_)), file_(std::exchange(other.file_, -1)), received_(std::move(other.received_)) {}
 
 SerialLine& SerialLine::operator=(SerialLine&& other) noexcept {
   std::swap(device_, other.device_);

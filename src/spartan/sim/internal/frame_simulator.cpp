@@ -171,19 +171,23 @@ Region FrameSimulator::region_of(std::size_t from, std::size_t to, std::optional
   Region region{start.x, start.y, start.x, start.y};
   for (std::size_t i = from; i < to; ++i) {
     const PlannedFrame& planned = request_.drive.frames()[i];
-    const StereoPair& pair = *rig_.find_pair(planned.pair);
     const double ground = geometry_.motion().world_from_body(planned.time_s).translation().z();
     const auto add = [&](const PlannedFrame& frame) {
+      const StereoPair& pair = *rig_.find_pair(frame.pair);
       for (const std::string& name : {pair.left, pair.right})
         add_footprint(region, *rig_.find_camera(name), geometry_.camera_pose(frame, name, frame.time_s), ground);
     };
     add(planned);
-    if (!round_tilt_rad || rig_.find_camera(pair.left)->mount == "body") continue;
+    if (!round_tilt_rad) continue;
     PlannedFrame turned = planned;
     turned.tilt_rad = *round_tilt_rad;
-    for (int pan = 0; pan < kPans; ++pan) {
-      turned.pan_rad = 2 * std::numbers::pi * pan / kPans;
-      add(turned);
+    for (const StereoPair& moved : rig_.pairs) {
+      if (rig_.find_camera(moved.left)->mount == "body") continue;
+      turned.pair = moved.name;
+      for (int pan = 0; pan < kPans; ++pan) {
+        turned.pan_rad = 2 * std::numbers::pi * pan / kPans;
+        add(turned);
+      }
     }
   }
   return region.grown(0.3);
@@ -208,34 +212,40 @@ const PlannedFrame& FrameSimulator::metered_frame(std::size_t i) const {
   return frames[i];
 }
 
-Exposure FrameSimulator::exposure_of(std::size_t i) {
-  const PlannedFrame& metered = metered_frame(i);
+// By the rule of the scenario.
+Exposure FrameSimulator::exposure_for(const PlannedFrame& metered, const LitScene& lit) const {
   const PairRenderer& tools = *pair_renderers_.at(metered.pair);
   const std::optional<RoverBody> rover = geometry_.visible_rover(metered);
   const Exposing metering = geometry_.exposing(metered, rig_.find_pair(metered.pair)->left, 0, rover);
-  return choose_exposure(scenario_.sensor, tools.left.mean_luminance(scene_of(i, {}).lit(), metering, kMeteredRow));
+  return choose_exposure(scenario_.sensor, tools.left.mean_luminance(lit, metering, kMeteredRow));
 }
 
 SimulatedFrame FrameSimulator::render(std::size_t i, const FrameFaultState& fault, const FrameCommands& commands) {
   PlannedFrame planned = request_.drive.frames()[i];
+  if (commands.trigger) {
+    planned.pair = commands.trigger->pair;
+    planned.time_s = commands.trigger->time_s;
+  }
   if (commands.angles) {
     planned.pan_rad = commands.angles->pan_rad;
     planned.tilt_rad = commands.angles->tilt_rad;
   }
+  const std::size_t number = commands.trigger ? commands.trigger->number : i;
   const PairRenderer& tools = *pair_renderers_.at(planned.pair);
   const StereoPair& pair = *rig_.find_pair(planned.pair);
   const auto round_tilt = commands.angles ? std::optional(commands.angles->tilt_rad) : std::nullopt;
   const LitScene lit = scene_of(i, round_tilt).lit();
   const std::optional<RoverBody> rover = geometry_.visible_rover(planned);
-  const Exposure exposure = commands.exposure ? *commands.exposure : exposure_of(i);
-  const auto seed = static_cast<std::uint64_t>(scenario_.seed) * 1000003 + 2 * i +
+  const Exposure exposure =
+      commands.exposure ? *commands.exposure : exposure_for(commands.trigger ? planned : metered_frame(i), lit);
+  const auto seed = static_cast<std::uint64_t>(scenario_.seed) * 1000003 + 2 * number +
                     static_cast<std::uint64_t>(scenario_.sensor.noise_seed) * kNoiseStride;
   SimulatedFrame result;
   StereoFrame& frame = result.frame;
-  frame.frame_id = static_cast<std::int64_t>(i);
+  frame.frame_id = static_cast<std::int64_t>(number);
   frame.position_id = planned.position_id;
   frame.pair = planned.pair;
-  frame.left_stamp = left_stamp(i, fault);
+  frame.left_stamp = stamp_at(planned.time_s + fault.left_jitter_s);
   frame.right_stamp = stamp_at(planned.time_s + fault.right_jitter_s);
   frame.pan_rad = planned.pan_rad;
   frame.tilt_rad = planned.tilt_rad;

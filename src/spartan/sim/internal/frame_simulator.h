@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "spartan/camera/sample_stream.h"
 #include "spartan/camera/samples.h"
 #include "spartan/core/threads.h"
 #include "spartan/rig/rig.h"
@@ -25,14 +26,17 @@
 
 namespace spartan::sim::internal {
 
-struct PlannedAngles {
-  double pan_rad = 0, tilt_rad = 0;
-};
-
 /// What takes the place of the plan and of the scenario's exposure rule.
 struct FrameCommands {
   std::optional<Exposure> exposure;
-  std::optional<PlannedAngles> angles;
+  std::optional<PanTiltAngles> angles;
+  /// A frame that is not planned: its pair, the middle of its exposure, and its number.
+  struct Trigger {
+    std::string pair;
+    double time_s = 0;
+    std::size_t number = 0;
+  };
+  std::optional<Trigger> trigger;
 };
 
 struct SimulatedFrame {
@@ -54,10 +58,9 @@ class FrameSimulator {
 
   FrameFaultState fault_at(std::size_t i) const;
   Stamp left_stamp(std::size_t i, const FrameFaultState& fault) const;
-  /// Renders frame number `i` of the drive; those that are near each other share a scene, if rendered in turn.
+  /// Renders frame number `i` of the drive, or at its place the one of `commands`; those that are near each other share
+  /// a scene, if rendered in turn.
   SimulatedFrame render(std::size_t i, const FrameFaultState& fault, const FrameCommands& commands = {});
-  /// The exposure that the rule of the scenario chooses for a frame.
-  Exposure exposure_of(std::size_t i);
   FramePreview preview_left(std::size_t i) const;
   /// Camera rays cast so far.
   std::int64_t rays() const { return rays_; }
@@ -78,6 +81,7 @@ class FrameSimulator {
   SceneAround scene_around(std::size_t from, std::size_t to, std::optional<double> round_tilt_rad) const;
   Region region_of(std::size_t from, std::size_t to, std::optional<double> round_tilt_rad) const;
   const PlannedFrame& metered_frame(std::size_t i) const;
+  Exposure exposure_for(const PlannedFrame& metered, const LitScene& lit) const;
 
   const SimulationRequest& request_;
   const ThreadPool& workers_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <thread>
 #include <utility>
@@ -45,7 +46,9 @@ LiveSimulation::LiveSimulation(SimulationRequest request, double speed, const Th
       speed_(speed),
       workers_(workers),
       simulator_(*request_, workers_),
-      info_(info_of(request_->scenario, simulator_.nominal())) {
+      info_(info_of(request_->scenario, simulator_.nominal())),
+      start_stamp_(stamp_at(0)),
+      newest_(start_stamp_) {
   const Scenario& scenario = request_->scenario;
   const auto seed = static_cast<std::uint64_t>(scenario.seed);
   const SensorFaults& faults = scenario.sensor_faults;
@@ -84,23 +87,74 @@ Status LiveSimulation::set_exposure(const std::string& pair, const ExposureSetti
   return {};
 }
 
-void LiveSimulation::set_angles(const PlannedAngles& angles) {
-  const std::lock_guard lock(mutex_);
-  angles_ = angles;
+bool LiveSimulation::is_on_mast(const std::string& pair) const {
+  return request_->rig.find_camera(request_->rig.find_pair(pair)->left)->mount != "body";
 }
 
-FrameCommands LiveSimulation::commands_for(const std::string& pair) {
+// With the lock. While an image is rendered, the rover's time stands still.
+Stamp LiveSimulation::now() const {
+  if (!start_) return start_stamp_;
+  if (speed_ == 0) return newest_;
+  const std::chrono::duration<double> passed = still_since_.value_or(Clock::now()) - *start_;
+  return stamp_at(seconds_between(stamp_at(0), start_stamp_) + passed.count() * speed_);
+}
+
+// With the lock, after a command.
+PanTiltAngles LiveSimulation::angles_at(Stamp stamp) const {
+  const double most = kPanTiltRate_rad_s * std::max(0.0, seconds_between(motion_->begin, stamp));
+  const auto moved = [&](double from, double to) { return from + std::clamp(to - from, -most, most); };
+  return {moved(motion_->from.pan_rad, motion_->to.pan_rad), moved(motion_->from.tilt_rad, motion_->to.tilt_rad)};
+}
+
+Status LiveSimulation::trigger(const std::string& pair) {
+  if (request_->rig.find_pair(pair) == nullptr)
+    return failure(ErrorCode::configuration, "has no pair '" + pair + "'", info_.path);
+  const std::lock_guard lock(mutex_);
+  triggers_.push_back({pair, now()});
+  return {};
+}
+
+Status LiveSimulation::move_to(const PanTiltAngles& angles) {
+  constexpr double kMostPan_rad = std::numbers::pi, kMostTilt_rad = std::numbers::pi / 2;
+  if (request_->rig.pan_tilt_units.empty()) return failure(ErrorCode::input, "has no pan-tilt unit", info_.path);
+  if (!(std::abs(angles.pan_rad) <= kMostPan_rad && std::abs(angles.tilt_rad) <= kMostTilt_rad)) {
+    return failure(ErrorCode::input, "the angles are beyond the limits of the pan-tilt unit, 180 and 90 deg",
+                   info_.path);
+  }
+  const std::lock_guard lock(mutex_);
+  const PanTiltUnit& unit = request_->rig.pan_tilt_units.front();
+  const PanTiltAngles from = motion_ ? angles_at(now()) : PanTiltAngles{unit.rest_pan_rad, unit.rest_tilt_rad};
+  motion_ = Motion{from, angles, now()};
+  return {};
+}
+
+Result<PanTiltReading> LiveSimulation::read() {
+  const std::lock_guard lock(mutex_);
+  if (!motion_) {
+    if (request_->rig.pan_tilt_units.empty()) return PanTiltReading();
+    const PanTiltUnit& unit = request_->rig.pan_tilt_units.front();
+    return PanTiltReading{{unit.rest_pan_rad, unit.rest_tilt_rad}, false};
+  }
+  const PanTiltAngles angles = angles_at(now());
+  return PanTiltReading{angles, angles.pan_rad != motion_->to.pan_rad || angles.tilt_rad != motion_->to.tilt_rad};
+}
+
+void LiveSimulation::set_angles(const PanTiltAngles& angles) {
+  const std::lock_guard lock(mutex_);
+  motion_ = Motion{angles, angles, now()};
+}
+
+FrameCommands LiveSimulation::commands_for(const std::string& pair, double time_s) {
   const std::lock_guard lock(mutex_);
   FrameCommands commands;
   if (const auto found = exposures_.find(pair); found != exposures_.end()) commands.exposure = found->second;
-  const bool moves = request_->rig.find_camera(request_->rig.find_pair(pair)->left)->mount != "body";
-  if (moves) commands.angles = angles_;
+  if (motion_ && is_on_mast(pair)) commands.angles = angles_at(stamp_at(time_s));
   return commands;
 }
 
 void LiveSimulation::begin() {
+  const std::lock_guard lock(mutex_);
   start_ = Clock::now();
-  start_stamp_ = stamp_at(0);
   if (!start_after_) return;
   start_stamp_ = std::max(start_stamp_, *start_after_);
   imu_index_ = first_after(imu_, *start_after_);
@@ -121,6 +175,10 @@ LiveSimulation::Event LiveSimulation::next_event() const {
   };
   const std::vector<PlannedFrame>& frames = request_->drive.frames();
   consider(frame_ < frames.size(), EventKind::exposure, [&] { return stamp_at(frames[frame_].time_s); });
+  {
+    const std::lock_guard lock(mutex_);
+    consider(!triggers_.empty(), EventKind::trigger, [&] { return triggers_.front().stamp; });
+  }
   consider(!arrivals_.empty(), EventKind::arrival, [&] { return arrivals_.front().stamp; });
   consider(imu_index_ < imu_.size(), EventKind::imu, [&] { return imu_[imu_index_].stamp; });
   consider(wheel_index_ < wheels_.size(), EventKind::wheels, [&] { return wheels_[wheel_index_].stamp; });
@@ -139,19 +197,52 @@ bool LiveSimulation::wait_for(Stamp stamp, Clock::time_point until) {
   return due <= until;
 }
 
-void LiveSimulation::expose() {
+void LiveSimulation::expose_planned() {
   const std::size_t i = frame_++;
   const PlannedFrame& planned = request_->drive.frames()[i];
   const FrameFaultState fault = simulator_.fault_at(i);
-  if (fault.dropped) return;
+  const FrameCommands commands = commands_for(planned.pair, planned.time_s);
+  const bool waits_for_trigger = commands.angles.has_value();
+  if (!fault.dropped && !waits_for_trigger) expose(i, fault, commands);
+}
+
+void LiveSimulation::expose_triggered() {
+  Trigger trigger;
+  {
+    const std::lock_guard lock(mutex_);
+    trigger = triggers_.front();
+    triggers_.pop_front();
+  }
+  const double time_s = seconds_between(stamp_at(0), trigger.stamp);
+  FrameCommands commands = commands_for(trigger.pair, time_s);
+  const std::vector<PlannedFrame>& frames = request_->drive.frames();
+  commands.trigger = FrameCommands::Trigger{trigger.pair, time_s, frames.size() + triggered_number_++};
+  const std::size_t before = frame_ == 0 ? 0 : frame_ - 1;
+  expose(before,
+         fault_state(request_->scenario.camera_faults, trigger.pair, time_s, commands.trigger->number,
+                     static_cast<std::uint64_t>(request_->scenario.seed)),
+         commands);
+}
+
+void LiveSimulation::expose(std::size_t frame, const FrameFaultState& fault, const FrameCommands& commands) {
   const auto begin = Clock::now();
+  {
+    const std::lock_guard lock(mutex_);
+    still_since_ = begin;
+  }
   Arrival arrival;
-  arrival.frame = simulator_.render(i, fault, commands_for(planned.pair)).frame;
-  *start_ += Clock::now() - begin;  // the rover's time stands still
-  arrival.stamp = stamp_at(planned.time_s + delay_s(request_->scenario.arrival, request_->scenario.seed, i));
+  arrival.frame = simulator_.render(frame, fault, commands).frame;
+  {
+    const std::lock_guard lock(mutex_);
+    *start_ += Clock::now() - begin;
+    still_since_.reset();
+  }
+  const auto number = static_cast<std::size_t>(arrival.frame.frame_id);
+  arrival.stamp = stamp_at(seconds_between(stamp_at(0), arrival.frame.left_stamp) +
+                           delay_s(request_->scenario.arrival, request_->scenario.seed, number));
   // In order within each pair.
   for (const Arrival& before : arrivals_) {
-    if (before.frame.pair == planned.pair) arrival.stamp = std::max(arrival.stamp, before.stamp);
+    if (before.frame.pair == arrival.frame.pair) arrival.stamp = std::max(arrival.stamp, before.stamp);
   }
   const auto later = std::find_if(arrivals_.begin(), arrivals_.end(),
                                   [&](const Arrival& other) { return other.stamp > arrival.stamp; });
@@ -185,8 +276,12 @@ Result<StreamRead> LiveSimulation::read(std::chrono::nanoseconds timeout) {
     if (event.kind == EventKind::none) return read;
     read.state = StreamRead::State::none_yet;
     if (!wait_for(event.stamp, until)) return read;
-    if (event.kind == EventKind::exposure) {
-      expose();
+    {
+      const std::lock_guard lock(mutex_);
+      newest_ = std::max(newest_, event.stamp);
+    }
+    if (event.kind == EventKind::exposure || event.kind == EventKind::trigger) {
+      event.kind == EventKind::exposure ? expose_planned() : expose_triggered();
       continue;
     }
     read.state = StreamRead::State::sample;

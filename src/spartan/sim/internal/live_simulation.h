@@ -18,29 +18,37 @@
 
 namespace spartan::sim::internal {
 
-/// See open_live_simulation(). read() renders, so it may take longer than its timeout.
-class LiveSimulation : public SampleStream, public CameraControl {
+/// See open_live_simulation(). read() renders, so it may take longer than its timeout. From the first command of the
+/// pan-tilt unit on, its cameras take only frames that are triggered.
+class LiveSimulation : public SampleStream, public CameraControl, public PanTiltControl {
  public:
   LiveSimulation(SimulationRequest request, double speed, const ThreadPool& workers);
 
   const StreamInfo& info() const override { return info_; }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
   CameraControl* control() override { return this; }
+  PanTiltControl* pan_tilt() override { return this; }
   void start_after(Stamp stamp) override { start_after_ = stamp; }
   /// The first frame of each pair.
   std::size_t previews(const std::string& pair) const override { return first_frame(pair) ? 1 : 0; }
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override;
 
   Status set_exposure(const std::string& pair, const ExposureSettings& settings) override;
-  /// The pan-tilt units look there, instead of where the plan of the drive says.
-  void set_angles(const PlannedAngles& angles);
+  Status trigger(const std::string& pair) override;
+  Status move_to(const PanTiltAngles& angles) override;
+  Result<PanTiltReading> read() override;
+  double sigma_rad() const override { return 0; }
+  /// The unit is there at once, as another one is that moves in its place.
+  void set_angles(const PanTiltAngles& angles);
+
+  static constexpr double kPanTiltRate_rad_s = 0.5;
 
   const SimulationRequest& request() const { return *request_; }
   const FrameSimulator& frames() const { return simulator_; }
 
  private:
   using Clock = std::chrono::steady_clock;
-  enum class EventKind { exposure, arrival, imu, wheels, compass, inclinometer, none };
+  enum class EventKind { exposure, trigger, arrival, imu, wheels, compass, inclinometer, none };
   struct Event {
     Stamp stamp;  // of the drive's clock
     EventKind kind = EventKind::none;
@@ -54,8 +62,13 @@ class LiveSimulation : public SampleStream, public CameraControl {
   void begin();
   Event next_event() const;
   bool wait_for(Stamp stamp, Clock::time_point until);
-  void expose();
-  FrameCommands commands_for(const std::string& pair);
+  void expose_planned();
+  void expose_triggered();
+  void expose(std::size_t frame, const FrameFaultState& fault, const FrameCommands& commands);
+  FrameCommands commands_for(const std::string& pair, double time_s);
+  bool is_on_mast(const std::string& pair) const;
+  Stamp now() const;
+  PanTiltAngles angles_at(Stamp stamp) const;
   Sample take(EventKind kind);
 
   std::unique_ptr<const SimulationRequest> request_;
@@ -73,10 +86,23 @@ class LiveSimulation : public SampleStream, public CameraControl {
   std::optional<Stamp> start_after_;
   std::optional<Clock::time_point> start_;
   Stamp start_stamp_;  // when it has begun
+  std::size_t triggered_number_ = 0;
 
-  std::mutex mutex_;
+  // What is set and read by other threads, too.
+  mutable std::mutex mutex_;
+  std::optional<Clock::time_point> still_since_;  // while an image is rendered
+  Stamp newest_;                                  // of an event
   std::map<std::string, Exposure> exposures_;
-  std::optional<PlannedAngles> angles_;
+  struct Motion {
+    PanTiltAngles from, to;
+    Stamp begin;
+  };
+  std::optional<Motion> motion_;
+  struct Trigger {
+    std::string pair;
+    Stamp stamp;
+  };
+  std::deque<Trigger> triggers_;
 };
 
 }  // namespace spartan::sim::internal

@@ -49,7 +49,7 @@ SimulationRequest request_of(const std::string& more = "") {
 std::vector<Sample> all_of(SampleStream& stream) {
   std::vector<Sample> samples;
   for (;;) {
-    auto read = stream.read({});
+    auto read = stream.read(milliseconds(0));
     EXPECT_TRUE(read);
     if (!read || read->state == StreamRead::State::end) return samples;
     if (read->sample) samples.push_back(std::move(*read->sample));
@@ -130,7 +130,7 @@ TEST(LiveSimulation, ASettingAppliesToTheNextImageOfItsPair) {
   LiveSimulation live(request_of("path: {length_m: 0.5}\n"), 0, ThreadPool(1));
   std::vector<StereoFrame> frames;
   for (;;) {
-    const auto read = live.read({});
+    const auto read = live.read(milliseconds(0));
     ASSERT_TRUE(read);
     if (read->state == StreamRead::State::end) break;
     const auto* frame = std::get_if<StereoFrame>(&*read->sample);
@@ -155,18 +155,46 @@ TEST(LiveSimulation, RefusesImpossibleSettings) {
   EXPECT_FALSE(live.set_exposure("narrow", {std::nan(""), 1}));
 }
 
-TEST(LiveSimulation, TheMastLooksWhereItIsToldTo) {
-  LiveSimulation live(request_of(), 0, ThreadPool(1));
+TEST(LiveSimulation, TheMastLooksWhereItIsToldToAndWaitsForTriggers) {
+  LiveSimulation live(request_of(), 0, ThreadPool(1)), planned(request_of(), 0, ThreadPool(1));
   live.set_angles({0.3, 1.0});
-  LiveSimulation planned(request_of(), 0, ThreadPool(1));
+  ASSERT_TRUE(live.trigger("wide"));
+  ASSERT_TRUE(live.trigger("wide"));
+  EXPECT_FALSE(live.trigger("nowhere"));
   const auto told = frames_of(all_of(live), "wide"), as_planned = frames_of(all_of(planned), "wide");
-  ASSERT_FALSE(told.empty());
-  ASSERT_EQ(told.size(), as_planned.size());
-  for (std::size_t i = 0; i < told.size(); ++i) {
-    EXPECT_EQ(told[i].pan_rad, 0.3);
-    EXPECT_EQ(told[i].tilt_rad, 1.0);
-    EXPECT_FALSE(same(told[i].left, as_planned[i].left));
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_NE(told[0].frame_id, told[1].frame_id);
+  for (const StereoFrame& frame : told) {
+    EXPECT_EQ(frame.pan_rad, 0.3);
+    EXPECT_EQ(frame.tilt_rad, 1.0);
+    for (const StereoFrame& other : as_planned) {
+      EXPECT_FALSE(same(frame.left, other.left));
+      EXPECT_NE(frame.frame_id, other.frame_id);
+    }
   }
+}
+
+TEST(LiveSimulation, ThePanTiltUnitTakesItsTime) {
+  LiveSimulation live(request_of(), 0, ThreadPool(1));
+  const auto rest = live.read();
+  ASSERT_TRUE(rest);
+  EXPECT_FALSE(rest->moves);
+  EXPECT_FALSE(live.move_to({4, 0}));
+  EXPECT_FALSE(live.move_to({0, 2}));
+  ASSERT_TRUE(live.move_to({1, rest->angles.tilt_rad}));
+  EXPECT_TRUE(live.read()->moves);
+  std::optional<Stamp> first;
+  double settled_s = 0;
+  for (;;) {
+    const auto read = live.read(milliseconds(0));
+    ASSERT_TRUE(read);
+    if (read->state == StreamRead::State::end) break;
+    if (!first) first = stamp_of(*read->sample);
+    const auto unit = live.read();
+    if (settled_s == 0 && !unit->moves) settled_s = seconds_between(*first, stamp_of(*read->sample));
+  }
+  EXPECT_NEAR(settled_s, 1 / LiveSimulation::kPanTiltRate_rad_s, 0.1);
+  EXPECT_EQ(live.read()->angles.pan_rad, 1);
 }
 
 TEST(LiveSimulation, RunsAtItsPace) {

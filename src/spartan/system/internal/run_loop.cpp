@@ -128,7 +128,8 @@ Status RunLoop::process_until_end() {
   while (request_.max_frames == 0 || frames_ < request_.max_frames) {
     // What a recorded run has computed since its last frame is stored with the next one, resumed or not.
     const bool can_stop = !recording_ || after_frame_;
-    if (hooks_.should_stop && hooks_.should_stop() && can_stop) {
+    const bool wants_stop = (hooks_.should_stop && hooks_.should_stop()) || execute_commands();
+    if (wants_stop && can_stop) {
       stopped_ = true;
       return {};
     }
@@ -186,6 +187,19 @@ std::vector<StageTime> RunLoop::take_stage_times() {
   return times;
 }
 
+bool RunLoop::execute_commands() {
+  if (recording_ || !hooks_.command) return false;
+  while (const auto command = hooks_.command()) {
+    if (*command == RunCommand::stop) return true;
+    if (panorama_) {
+      panorama_->request();
+    } else {
+      hooks_.log.warning("no panorama: the run has no pan-tilt unit");
+    }
+  }
+  return false;
+}
+
 Status RunLoop::process(const Sample& sample) {
   if (const auto* frame = std::get_if<StereoFrame>(&sample)) return process_frame(*frame);
   if (const auto* missing = std::get_if<MissingFrame>(&sample)) return process_missing(*missing);
@@ -193,8 +207,12 @@ Status RunLoop::process(const Sample& sample) {
   if (const auto* imu = std::get_if<ImuSample>(&sample)) {
     pipeline_.add(*imu);
     report_estimate();
+    if (panorama_ && !catching_up_) panorama_->add(*imu);
   }
-  if (const auto* wheels = std::get_if<WheelSample>(&sample)) pipeline_.add(*wheels);
+  if (const auto* wheels = std::get_if<WheelSample>(&sample)) {
+    pipeline_.add(*wheels);
+    if (panorama_ && !catching_up_) panorama_->add(*wheels);
+  }
   if (const auto* compass = std::get_if<CompassSample>(&sample)) pipeline_.add(*compass);
   if (const auto* inclinometer = std::get_if<InclinometerSample>(&sample)) pipeline_.add(*inclinometer);
   return {};
@@ -282,6 +300,7 @@ Status RunLoop::record(RunResult result) {
     if (last_position_) distance_m_ += (position - *last_position_).norm();
     last_position_ = position;
   }
+  if (panorama_ && !catching_up_) panorama_->add(RoverMotion{frame.stamp, distance_m_, pipeline_.body_velocity()});
   const RunProgress progress{frames_, total_frames_, distance_m_, frame.status};
   const CommitOptions& options = request_.options.commit;
   const bool far = options.every_m > 0 && distance_m_ - distance_committed_m_ >= options.every_m;

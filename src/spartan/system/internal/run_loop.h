@@ -17,6 +17,7 @@
 #include "spartan/core/stage_clock.h"
 #include "spartan/system/internal/exposure_stage.h"
 #include "spartan/system/internal/latency_record.h"
+#include "spartan/system/internal/panorama.h"
 #include "spartan/system/internal/resumed_stream.h"
 #include "spartan/system/internal/run_recorder.h"
 #include "spartan/system/internal/watchdog.h"
@@ -34,6 +35,7 @@ struct RunStream {
   ResumedStream* resumed;    ///< the samples, if the run is live and is resumed
   StreamRecorder* recorder;  ///< that records a live stream
   ExposureStage* exposure;   ///< null: the cameras are not controlled
+  Panorama* panorama;        ///< null: there are none
 };
 
 /// Feeds the samples of a stream to the pipeline and its results to the recorder, and now and then the state of the
@@ -50,6 +52,7 @@ class RunLoop {
         resumed_stream_(stream.resumed),
         stream_recorder_(stream.recorder),
         exposure_(stream.exposure),
+        panorama_(stream.panorama),
         recorder_(std::move(recorder)),
         pipeline_(std::move(pipeline)),
         start_(start),
@@ -82,6 +85,8 @@ class RunLoop {
   Status seek(const RunStore::Checkpoint& checkpoint);
   Result<StereoFrame> frame_at(const FrameKey& key);
   Status process(const Sample& sample);
+  /// Whether the run is to end.
+  bool execute_commands();
   Status finish();
   /// `fault`: of the image that is missing; empty where both are there.
   Status process_frame(const StereoFrame& frame, std::string_view fault = {});
@@ -100,6 +105,7 @@ class RunLoop {
   ResumedStream* resumed_stream_;
   StreamRecorder* stream_recorder_;
   ExposureStage* exposure_;
+  Panorama* panorama_;
   std::map<std::string, Stamp> last_stamps_;  // of a live stream, by source_of()
   std::unique_ptr<RunRecorder> recorder_;
   Pipeline pipeline_;  // reads map tiles through the recorder

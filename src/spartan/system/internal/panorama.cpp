@@ -1,0 +1,261 @@
+#include "spartan/system/internal/panorama.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <numbers>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace spartan::internal {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kStill_m_s = 0.005, kStill_rad_s = 0.03, kDrives_m_s = 0.03, kDrives_rad_s = 0.1;
+constexpr std::chrono::milliseconds kPoll{20};
+constexpr int kAttempts = 3;  // of a motion, and of a frame
+
+}  // namespace
+
+void StationaryCheck::note(Stamp stamp, double speed_m_s, double rate_rad_s) {
+  newest_ = std::max(newest_.value_or(stamp), stamp);
+  const bool moves = speed_m_s > kStill_m_s || rate_rad_s > kStill_rad_s;
+  if (moves || !moved_at_) moved_at_ = std::max(moved_at_.value_or(stamp), stamp);
+  drives_ = speed_m_s > kDrives_m_s || rate_rad_s > kDrives_rad_s;
+}
+
+void StationaryCheck::add(const RoverMotion& motion) {
+  speed_at_ = std::max(speed_at_.value_or(motion.stamp), motion.stamp);
+  const bool drove = drives_;
+  note(motion.stamp, motion.velocity.head<3>().norm(), motion.velocity.tail<3>().norm());
+  // The mean over a long interval does not tell when the rover moved.
+  const bool is_recent = frame_at_ && seconds_between(*frame_at_, motion.stamp) <= kStill_s;
+  if (!is_recent) drives_ = drove;
+  frame_at_ = motion.stamp;
+}
+
+void StationaryCheck::add(const ImuSample& sample) {
+  note(sample.stamp, 0, sample.gyro_rad_s.norm());
+}
+
+// The mean speed over kStill_s, so that the steps of an encoder are not taken for a motion.
+void StationaryCheck::add(const WheelSample& sample) {
+  wheels_.push_back(sample);
+  while (seconds_between(wheels_.front().stamp, sample.stamp) > kStill_s) wheels_.pop_front();
+  const WheelSample& first = wheels_.front();
+  const double seconds = seconds_between(first.stamp, sample.stamp);
+  if (seconds < 0.5 * kStill_s) return;
+  speed_at_ = std::max(speed_at_.value_or(sample.stamp), sample.stamp);
+  const double moved_m = std::max(std::abs(sample.left_m - first.left_m), std::abs(sample.right_m - first.right_m));
+  note(sample.stamp, moved_m / seconds, 0);
+}
+
+bool StationaryCheck::is_stationary() const {
+  return speed_at_ && seconds_between(*speed_at_, *newest_) < 2 * kStill_s &&
+         seconds_between(*moved_at_, *newest_) >= kStill_s;
+}
+
+Result<std::unique_ptr<Panorama>> Panorama::create(const Rig& rig, const PanoramaOptions& options, PanTiltControl& unit,
+                                                   CameraControl* cameras, const RunHooks& hooks) {
+  std::unique_ptr<Panorama> panorama(new Panorama(rig, options, unit, cameras, hooks));
+  if (panorama->pairs_.empty()) {
+    return failure(ErrorCode::configuration, "has no stereo pair on a pan-tilt unit, which a panorama needs", rig.name,
+                   "set mount of its cameras, or omit --panorama-every and --control");
+  }
+  return panorama;
+}
+
+Panorama::Panorama(const Rig& rig, const PanoramaOptions& options, PanTiltControl& unit, CameraControl* cameras,
+                   const RunHooks& hooks)
+    : options_(options), unit_(unit), cameras_(cameras), hooks_(hooks) {
+  if (rig.pan_tilt_units.empty()) return;
+  const PanTiltUnit& mast = rig.pan_tilt_units.front();
+  rest_ = {mast.rest_pan_rad, mast.rest_tilt_rad};
+  for (const StereoPair& pair : rig.pairs) {
+    if (rig.find_camera(pair.left)->mount == mast.name) pairs_.insert(pair.name);
+  }
+  if (!pairs_.empty()) thread_ = std::thread([this] { run(); });
+}
+
+Panorama::~Panorama() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Panorama::request() {
+  const std::lock_guard lock(mutex_);
+  requested_ = true;
+}
+
+void Panorama::update(Stamp stamp) {
+  const std::lock_guard lock(mutex_);
+  latest_ = std::max(latest_, stamp);
+  if (phase_ != Phase::idle || wanted_) {
+    rover_moved_ = rover_moved_ || check_.drives();
+    return;
+  }
+  const bool due = options_.every_m > 0 && distance_m_ >= next_at_m_;
+  if ((!due && !requested_) || !check_.is_stationary()) return;
+  requested_ = rover_moved_ = false;
+  next_at_m_ = distance_m_ + options_.every_m;
+  wanted_ = true;
+  changed_.notify_all();
+}
+
+bool Panorama::label(StereoFrame& frame) {
+  const std::lock_guard lock(mutex_);
+  latest_ = std::max(latest_, frame.left_stamp);
+  frame.position_id = phase_ == Phase::idle || rover_moved_ ? -1 : position_id_;
+  if (!pairs_.contains(frame.pair)) return true;
+  if (phase_ != Phase::taking || missing_.erase(frame.pair) == 0) return false;
+  frame.pan_rad = angles_.pan_rad;
+  frame.tilt_rad = angles_.tilt_rad;
+  ++views_;
+  changed_.notify_all();
+  return true;
+}
+
+void Panorama::run() {
+  for (;;) {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return wanted_ || ended_; });
+      if (ended_) return;
+      wanted_ = false;
+      // Larger than that of every panorama before, in this run and in one that it resumes.
+      position_id_ = std::max(position_id_ + 1, static_cast<std::int64_t>(std::time(nullptr)));
+      phase_ = Phase::moving;
+      views_ = 0;
+    }
+    report(true);
+    take_all();
+    set_phase(Phase::idle);
+    report(false);
+  }
+}
+
+void Panorama::report(bool begins) {
+  PanoramaEvent event{begins, position_id_, {}, 0};
+  {
+    const std::lock_guard lock(mutex_);
+    event.stamp = latest_;
+    event.views = views_;
+  }
+  if (!begins) hooks_.log.info(fmt::format("panorama of {} views", event.views));
+  if (hooks_.panorama) hooks_.panorama(event);
+}
+
+void Panorama::take_all() {
+  std::vector<double> tilts_rad;
+  for (const double tilt_deg : options_.tilts_deg) tilts_rad.push_back(tilt_deg * kDegree);
+  if (tilts_rad.empty()) tilts_rad.push_back(rest_.tilt_rad);
+  for (const double tilt_rad : tilts_rad) {
+    for (const double pan_deg : options_.pans_deg) {
+      if (!look_at({pan_deg * kDegree, tilt_rad})) break;
+    }
+  }
+  set_phase(Phase::moving);
+  if (const Status moved = unit_.move_to(rest_); !moved) hooks_.log.warning("panorama: " + moved.error().message());
+  const std::lock_guard lock(mutex_);
+  if (rover_moved_) hooks_.log.warning("the panorama ends early: the rover moves");
+}
+
+// Waits, unless the panorama ends. Whether it goes on.
+bool Panorama::wait(std::chrono::duration<double> time) {
+  std::unique_lock lock(mutex_);
+  return !changed_.wait_for(lock, time, [this] { return ends(); });
+}
+
+void Panorama::set_phase(Phase phase) {
+  const std::lock_guard lock(mutex_);
+  phase_ = phase;
+}
+
+// Until the unit is there and no longer moves.
+Result<PanTiltReading> Panorama::settle(const PanTiltAngles& angles) {
+  const auto until = Clock::now() + std::chrono::duration<double>(options_.timeout_s);
+  if (Status moved = unit_.move_to(angles); !moved) return failure(moved);
+  for (;;) {
+    const auto reading = unit_.read();
+    if (!reading || !reading->moves) return reading;
+    if (Clock::now() > until)
+      return failure(ErrorCode::read_error,
+                     fmt::format("the pan-tilt unit still moves after {:.1f} s", options_.timeout_s));
+    if (!wait(kPoll)) return failure(ErrorCode::interrupted, "ends early");
+  }
+}
+
+// Whether the panorama goes on.
+bool Panorama::look_at(const PanTiltAngles& angles) {
+  set_phase(Phase::moving);
+  for (int attempt = 1; attempt <= kAttempts; ++attempt) {
+    const auto reading = settle(angles);
+    if (reading) {
+      if (!wait(std::chrono::duration<double>(options_.settle_s))) return false;
+      take_frames(reading->angles);
+      return wait({});
+    }
+    if (reading.error().code == ErrorCode::interrupted) return false;
+    hooks_.log.warning(fmt::format("panorama, pan {:.1f} deg, tilt {:.1f} deg: {}", angles.pan_rad / kDegree,
+                                   angles.tilt_rad / kDegree, reading.error().message()));
+    if (reading.error().code == ErrorCode::input) break;  // beyond its limits
+  }
+  return wait({});
+}
+
+void Panorama::take_frames(const PanTiltAngles& angles) {
+  {
+    const std::lock_guard lock(mutex_);
+    phase_ = Phase::taking;
+    angles_ = angles;
+    missing_ = pairs_;
+  }
+  for (int attempt = 1; attempt <= kAttempts; ++attempt) {
+    std::set<std::string> missing;
+    {
+      const std::lock_guard lock(mutex_);
+      missing = missing_;
+    }
+    for (const std::string& pair : missing) {
+      // Cameras that cannot be triggered take frames by themselves.
+      if (cameras_ != nullptr) static_cast<void>(cameras_->trigger(pair));
+    }
+    if (wait_for_frames()) return;
+  }
+  const std::lock_guard lock(mutex_);
+  hooks_.log.warning(
+      fmt::format("panorama, pan {:.1f} deg: no frame of pair '{}'", angles.pan_rad / kDegree, *missing_.begin()));
+}
+
+// At most frame_timeout_s of the stream's time, which stands still while a simulation renders, and timeout_s of real
+// time. Whether all are there, or the panorama ends.
+bool Panorama::wait_for_frames() {
+  const auto until = Clock::now() + std::chrono::duration<double>(options_.timeout_s);
+  std::unique_lock lock(mutex_);
+  const Stamp begin = latest_;
+  while (seconds_between(begin, latest_) < options_.frame_timeout_s && Clock::now() < until) {
+    if (changed_.wait_for(lock, kPoll, [this] { return missing_.empty() || ends(); })) return true;
+  }
+  return false;
+}
+
+Result<StreamRead> PanoramaStream::read(std::chrono::nanoseconds timeout) {
+  const auto until = std::chrono::steady_clock::now() + timeout;
+  for (;;) {
+    const auto left = until - std::chrono::steady_clock::now();
+    auto read = stream_.read(std::max<std::chrono::nanoseconds>(left, std::chrono::nanoseconds(0)));
+    if (!read || !read->sample) return read;
+    auto* const frame = std::get_if<StereoFrame>(&*read->sample);
+    if (frame == nullptr || panorama_.label(*frame)) return read;
+  }
+}
+
+}  // namespace spartan::internal

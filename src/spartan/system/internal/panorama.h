@@ -1,0 +1,143 @@
+// Panoramas of a live run: the pan-tilt unit turns, and each of its pairs takes a frame at each angle.
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <type_traits>
+
+#include "spartan/camera/sample_stream.h"
+#include "spartan/core/log.h"
+#include "spartan/core/pose.h"
+#include "spartan/rig/rig.h"
+#include "spartan/system/run.h"
+#include "spartan/system/run_options.h"
+
+namespace spartan::internal {
+
+/// How the rover moves at a frame of the odometry.
+struct RoverMotion {
+  Stamp stamp;
+  double distance_m = 0;                 ///< path length so far
+  Vector6d velocity = Vector6d::Zero();  ///< Pipeline::body_velocity()
+};
+
+/// Whether the rover is stationary, by frames of the odometry, wheels and gyroscope: none has shown a motion for
+/// kStill_s, and frames or wheels would have shown one.
+class StationaryCheck {
+ public:
+  void add(const RoverMotion& motion);
+  void add(const WheelSample& sample);
+  void add(const ImuSample& sample);
+  bool is_stationary() const;
+  /// A motion that is not noise.
+  bool drives() const { return drives_; }
+
+  static constexpr double kStill_s = 0.5;
+
+ private:
+  void note(Stamp stamp, double speed_m_s, double rate_rad_s);
+
+  std::deque<WheelSample> wheels_;          // of the last kStill_s
+  std::optional<Stamp> newest_, speed_at_;  // of all samples; of those that show a speed
+  std::optional<Stamp> moved_at_;           // the newest that shows a motion, or the first of all
+  std::optional<Stamp> frame_at_;
+  bool drives_ = false;
+};
+
+/// A panorama begins when it was requested, or the rover has driven PanoramaOptions::every_m since the last one, and as
+/// soon as the rover is stationary; it ends early where the rover drives on. A thread moves the unit, waits until it is
+/// still, and takes the frames; what goes wrong with one angle is logged, and the next one follows.
+class Panorama {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// `unit` and `cameras` (null: they take frames by themselves) are borrowed. Code `configuration`: no pair of the rig
+  /// is on its pan-tilt unit.
+  static Result<std::unique_ptr<Panorama>> create(const Rig& rig, const PanoramaOptions& options, PanTiltControl& unit,
+                                                  CameraControl* cameras, const RunHooks& hooks);
+  /// Ends a panorama that has begun.
+  ~Panorama();
+  Panorama(const Panorama&) = delete;
+  Panorama& operator=(const Panorama&) = delete;
+
+  void request();
+  /// Each frame of the odometry and each sample of these sensors, in one thread.
+  template <class Motion>
+  void add(const Motion& motion) {
+    check_.add(motion);
+    if constexpr (std::is_same_v<Motion, RoverMotion>) distance_m_ = motion.distance_m;
+    update(motion.stamp);
+  }
+  /// Gives a frame its stop, and one of the unit's cameras its angles. False: it was not taken for a panorama, or while
+  /// the unit moved.
+  bool label(StereoFrame& frame);
+
+ private:
+  enum class Phase { idle, moving, taking };
+
+  Panorama(const Rig& rig, const PanoramaOptions& options, PanTiltControl& unit, CameraControl* cameras,
+           const RunHooks& hooks);
+  void update(Stamp stamp);
+  void run();
+  void report(bool begins);
+  void take_all();
+  bool look_at(const PanTiltAngles& angles);
+  Result<PanTiltReading> settle(const PanTiltAngles& angles);
+  void take_frames(const PanTiltAngles& angles);
+  void set_phase(Phase phase);
+  bool wait(std::chrono::duration<double> time);
+  bool wait_for_frames();
+  bool ends() const { return ended_ || rover_moved_; }
+
+  PanoramaOptions options_;
+  PanTiltControl& unit_;
+  CameraControl* cameras_;
+  RunHooks hooks_;
+  PanTiltAngles rest_;
+  std::set<std::string> pairs_;  // on the unit
+  StationaryCheck check_;
+  double distance_m_ = 0;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  Phase phase_ = Phase::idle;
+  bool requested_ = false, wanted_ = false, rover_moved_ = false, ended_ = false;
+  double next_at_m_ = 0;
+  std::int64_t position_id_ = -1;
+  PanTiltAngles angles_;
+  std::set<std::string> missing_;  // pairs without a frame at these angles
+  int views_ = 0;
+  Stamp latest_;  // of all frames and sensor samples
+  std::thread thread_;
+};
+
+/// A stream whose frames are labelled by a Panorama; those that it does not want are left out. Both are borrowed.
+class PanoramaStream : public SampleStream {
+ public:
+  PanoramaStream(SampleStream& stream, Panorama& panorama) : stream_(stream), panorama_(panorama) {}
+
+  const StreamInfo& info() const override { return stream_.info(); }
+  Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
+  DiscardedSamples discarded() const override { return stream_.discarded(); }
+  CameraControl* control() override { return stream_.control(); }
+  PanTiltControl* pan_tilt() override { return stream_.pan_tilt(); }
+  void start_after(Stamp stamp) override { stream_.start_after(stamp); }
+  std::size_t previews(const std::string& pair) const override { return stream_.previews(pair); }
+  Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
+    return stream_.preview(pair, index);
+  }
+
+ private:
+  SampleStream& stream_;
+  Panorama& panorama_;
+};
+
+}  // namespace spartan::internal
