@@ -1,0 +1,178 @@
+// Panoramas of a live run: the simulated rover with its own pan-tilt unit, and with an emulated one on a serial line.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "small_scenario.h"
+#include "spartan/camera/recording.h"
+#include "spartan/core/files.h"
+#include "spartan/system/run.h"
+#include "spartan/testing/pan_tilt_emulator.h"
+#include "spartan/testing/temporary_folder.h"
+
+#ifdef SPARTAN_HAS_SIM
+#include "spartan/sim/internal/live_simulation.h"
+
+namespace spartan {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using sim::internal::LiveSimulation;
+using testing::PanTiltEmulator;
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+sim::SimulationRequest small_request(const std::string& capture) {
+  std::string text = testing::kSmallScenario;
+  const std::string before = "capture: {stops_m: [0]}";
+  text.replace(text.find(before), before.size(), "capture: {" + capture + "}");
+  sim::SimulationRequest request;
+  request.scenario = sim::parse_scenario(text, "small").value();
+  request.rig = parse_rig_yaml(testing::kSmallRig, "small").value();
+  request.drive = sim::plan_drive(request.scenario, request.rig, text, "small").value();
+  return request;
+}
+
+// The cameras of the simulation are where an emulated unit is.
+class MovedSimulation : public SampleStream {
+ public:
+  MovedSimulation(LiveSimulation& simulation, const PanTiltEmulator& emulator)
+      : simulation_(simulation), emulator_(emulator) {}
+  const StreamInfo& info() const override { return simulation_.info(); }
+  Result<StreamRead> read(std::chrono::nanoseconds timeout) override {
+    const double step_rad = PanTiltEmulator::kStep_arcsec / 3600 * kDegree;
+    simulation_.set_angles({-emulator_.position('P') * step_rad, -emulator_.position('T') * step_rad});
+    return simulation_.read(timeout);
+  }
+  CameraControl* control() override { return simulation_.control(); }
+  std::size_t previews(const std::string& pair) const override { return simulation_.previews(pair); }
+  Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
+    return simulation_.preview(pair, index);
+  }
+
+ private:
+  LiveSimulation& simulation_;
+  const PanTiltEmulator& emulator_;
+};
+
+class RunPanorama : public ::testing::Test {
+ protected:
+  RunRequest request() const {
+    RunRequest request;
+    request.output = folder_.path() + "/run";
+    request.record = true;
+    request.options.panorama.every_m = 0.1;
+    request.options.panorama.pans_deg = {-20, 0, 20};
+    return request;
+  }
+  RunHooks hooks() {
+    RunHooks hooks;
+    hooks.panorama = [this](const PanoramaEvent& event) {
+      const std::lock_guard lock(mutex_);
+      events_.push_back(event);
+    };
+    return hooks;
+  }
+  // The views of the wide pair that were recorded.
+  std::vector<StereoFrame> recorded_views() const {
+    std::vector<StereoFrame> views;
+    const auto recording = open_recording(folder_.path() + "/run/live/1");
+    EXPECT_TRUE(recording) << recording.error().message();
+    for (auto read = (*recording)->read({}); read && read->sample; read = (*recording)->read({})) {
+      const auto* frame = std::get_if<StereoFrame>(&*read->sample);
+      if (frame != nullptr && frame->pair == "wide") views.push_back(*frame);
+    }
+    return views;
+  }
+
+  testing::TemporaryFolder folder_;
+  std::mutex mutex_;
+  std::vector<PanoramaEvent> events_;
+};
+
+// The first by itself, the second on command.
+TEST_F(RunPanorama, IsTakenWhileTheRoverIsStationary) {
+  LiveSimulation simulation(small_request("stops_m: [0], pan_period_s: 9"), 3, ThreadPool(1));
+  RunHooks hooks = this->hooks();
+  bool asked = false;
+  hooks.command = [&]() -> std::optional<RunCommand> {
+    const std::lock_guard lock(mutex_);
+    if (events_.size() != 2 || asked) return std::nullopt;
+    asked = true;
+    return RunCommand::panorama;
+  };
+  const auto outcome = run_live(simulation, request(), hooks);
+  ASSERT_TRUE(outcome) << outcome.error().message();
+  ASSERT_GE(events_.size(), 4u) << "two panoramas";
+  for (const std::size_t i : {0u, 2u}) {
+    EXPECT_TRUE(events_[i].begins);
+    EXPECT_FALSE(events_[i + 1].begins);
+    EXPECT_EQ(events_[i + 1].views, 3);
+    EXPECT_EQ(events_[i + 1].position_id, events_[i].position_id);
+  }
+  EXPECT_GT(events_[2].position_id, events_[0].position_id);
+  const auto views = recorded_views();
+  ASSERT_GE(views.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_NEAR(views[i].pan_rad, (20.0 * static_cast<double>(i % 3) - 20) * kDegree, 1e-9);
+    EXPECT_NEAR(views[i].tilt_rad, 65 * kDegree, 1e-6) << "the rest angle";
+    EXPECT_EQ(views[i].position_id, events_[i < 3 ? 0 : 2].position_id);
+  }
+  EXPECT_TRUE(std::filesystem::exists(folder_.path() + "/run/maps/global.tif"));
+}
+
+// The unit loses its power in the middle, and the line is noisy.
+TEST_F(RunPanorama, ByAnEmulatedUnitOnASerialLine) {
+  LiveSimulation simulation(small_request("stops_m: [0], pan_period_s: 7"), 2, ThreadPool(1));
+  PanTiltEmulator emulator(3000);
+  MovedSimulation stream(simulation, emulator);
+  RunRequest request = this->request();
+  request.options.panorama.every_m = 10;
+  request.options.panorama.tilts_deg = {45};
+  request.pan_tilt = "flir:" + emulator.device();
+  RunHooks hooks = this->hooks();
+  hooks.panorama = [&, record = hooks.panorama](const PanoramaEvent& event) {
+    record(event);
+    if (event.begins) emulator.lose_power(300ms);
+    emulator.send_garbage(5);
+  };
+  const auto outcome = run_live(stream, request, hooks);
+  ASSERT_TRUE(outcome) << outcome.error().message();
+  ASSERT_EQ(events_.size(), 2u);
+  EXPECT_EQ(events_[1].views, 3);
+  const auto views = recorded_views();
+  ASSERT_EQ(views.size(), 3u);
+  const double step_rad = PanTiltEmulator::kStep_arcsec / 3600 * kDegree;
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(views[i].pan_rad, (20.0 * static_cast<double>(i) - 20) * kDegree, step_rad);
+    EXPECT_NEAR(views[i].tilt_rad, 45 * kDegree, step_rad);
+  }
+}
+
+TEST_F(RunPanorama, NeedsAUnit) {
+  LiveSimulation simulation(small_request("stops_m: [0]"), 0, ThreadPool(1));
+  const PanTiltEmulator emulator;
+  MovedSimulation without_unit(simulation, emulator);
+  const auto outcome = run_live(without_unit, request(), hooks());
+  ASSERT_FALSE(outcome);
+  EXPECT_EQ(outcome.error().code, ErrorCode::usage);
+  EXPECT_THAT(outcome.error().message(), HasSubstr("--pan-tilt"));
+  RunRequest wrong = request();
+  wrong.pan_tilt = "flir:/nowhere";
+  EXPECT_FALSE(run_live(simulation, wrong, hooks()));
+}
+
+}  // namespace
+}  // namespace spartan
+#endif
