@@ -228,21 +228,30 @@ void Panorama::take_frames(const PanTiltAngles& angles) {
       // Cameras that cannot be triggered take frames by themselves.
       if (cameras_ != nullptr) static_cast<void>(cameras_->trigger(pair));
     }
-    if (wait_for_frames()) return;
+    if (!wait_for_frames()) continue;
+    // A frame that was triggered twice may come twice: the second one must not be taken for one at the next angles.
+    set_phase(Phase::moving);
+    if (attempt > 1) wait_in_stream([this] { return ends(); });
+    return;
   }
   const std::lock_guard lock(mutex_);
   hooks_.log.warning(
       fmt::format("panorama, pan {:.1f} deg: no frame of pair '{}'", angles.pan_rad / kDegree, *missing_.begin()));
 }
 
-// At most frame_timeout_s of the stream's time, which stands still while a simulation renders, and timeout_s of real
-// time. Whether all are there, or the panorama ends.
 bool Panorama::wait_for_frames() {
-  const auto until = Clock::now() + std::chrono::duration<double>(options_.timeout_s);
+  return wait_in_stream([this] { return missing_.empty() || ends(); });
+}
+
+// At most frame_timeout_s of the stream's time, which stands still while a simulation renders; if the stream has ended,
+// some timeout_s of real time. Whether `done`, which is called with the lock.
+bool Panorama::wait_in_stream(const std::function<bool()>& done) {
+  constexpr double kPatience = 4;
+  const auto until = Clock::now() + std::chrono::duration<double>(kPatience * options_.timeout_s);
   std::unique_lock lock(mutex_);
   const Stamp begin = latest_;
   while (seconds_between(begin, latest_) < options_.frame_timeout_s && Clock::now() < until) {
-    if (changed_.wait_for(lock, kPoll, [this] { return missing_.empty() || ends(); })) return true;
+    if (changed_.wait_for(lock, kPoll, done)) return true;
   }
   return false;
 }

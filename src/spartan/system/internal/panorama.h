@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -94,7 +95,9 @@ class Panorama {
   void take_frames(const PanTiltAngles& angles);
   void set_phase(Phase phase);
   bool wait(std::chrono::duration<double> time);
+  /// Whether all are there, or the panorama ends.
   bool wait_for_frames();
+  bool wait_in_stream(const std::function<bool()>& done);
   bool ends() const { return ended_ || rover_moved_; }
 
   PanoramaOptions options_;
