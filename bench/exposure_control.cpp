@@ -97,9 +97,10 @@ sim::SimulationRequest request_of(const Event& event, double delay_ms) {
   const std::string text = kScenario + event.light + fmt::format("arrival: {{delay_ms: {}}}\n", delay_ms);
   sim::SimulationRequest request;
   request.scenario = sim::parse_scenario(text, "exposure").value();
-  for (const LightStep& step : event.steps)
+  for (const LightStep& step : event.steps) {
     request.scenario.camera_faults.push_back(
         {sim::CameraFaultKind::brightness_step, "", step.from_s, step.to_s, step.factor});
+  }
   request.rig = parse_rig_yaml(kRig, "half").value();
   request.drive = sim::plan_drive(request.scenario, request.rig, text, "exposure").value();
   return request;

@@ -5,7 +5,7 @@
 
 A command line is a line of a code block, or an example of --help, that starts with `spartan`. Lines with placeholders
 in capitals, brackets or "…" are synopses. They run in the order of the documents, in a folder that holds what `make
-demo` leaves and the other files that they name. Lines that render a shipped scenario take a minute: --long runs them
+demo` leaves and the other files that they name. Lines that render a shipped scenario take minutes: --long runs them
 alone. Lines with $SPARTAN_DATA need the recordings. Exit code 77 (skipped) where the program has no simulator.
 """
 import os
@@ -18,7 +18,7 @@ from pathlib import Path
 
 PLACEHOLDER = re.compile(r"(?<![$\w])(RECORDING|RUN|TRUTH|LEFT|RIGHT|INPUT|FILE|DIR|MAP|EST|GT|RIG|REQ|SCENARIO)\b"
                          r"|[\[\]…]|\w\|\w")
-RENDERS = re.compile(r"^spartan (demo|simulate)\b")
+RENDERS = re.compile(r"^spartan ((demo|simulate)\b|(run|record) sim:)")
 
 
 def lines_of_documents(source):

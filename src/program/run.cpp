@@ -19,6 +19,7 @@
 #include "program/rover_messages.h"
 #include "program/run_arguments.h"
 #include "program/run_summary_text.h"
+#include "program/service_notifier.h"
 #include "program/trajectory_report.h"
 #include "spartan/core/files.h"
 #include "spartan/report/report.h"
@@ -55,17 +56,27 @@ Result<std::unique_ptr<Publisher>> open_publisher(const RunArguments& arguments,
   return publisher;
 }
 
-// Borrows the publisher and the control lines, which may be null.
-RunHooks live_hooks(const Context& context, Progress& progress, Publisher* publisher, ControlLines* control) {
+// What connects a live run to the rover's computer. Borrowed; the first two may be null.
+struct RoverLinks {
+  Publisher* publisher;
+  ControlLines* control;
+  ServiceNotifier& service;
+};
+
+RunHooks live_hooks(const Context& context, Progress& progress, const RoverLinks& links) {
   RunHooks hooks = run_hooks(context, progress);
   hooks.hung = [log = context.log](const std::string& stage, double seconds) {
     log.error(fmt::format("stage '{}' has not ended for {:.1f} s; the run ends", stage, seconds));
     std::_Exit(kInternalFault);
   };
-  if (control != nullptr) hooks.command = [control] { return control->next(); };
+  if (links.control != nullptr) hooks.command = [control = links.control] { return control->next(); };
+  hooks.frame = [publisher = links.publisher, service = &links.service](const FrameRecord& frame) {
+    service->frame(fmt::format("frame {}, odometry {}", frame.frame_id, frame.status));
+    if (publisher != nullptr) publisher->publish(health_message(frame));
+  };
+  Publisher* const publisher = links.publisher;
   if (publisher == nullptr) return hooks;
   hooks.estimate = [publisher](const LocalizationEstimate& estimate) { publisher->publish(pose_message(estimate)); };
-  hooks.frame = [publisher](const FrameRecord& frame) { publisher->publish(health_message(frame)); };
   hooks.map = [publisher](const MappedStop& stop) { publisher->publish(map_message(stop)); };
   hooks.panorama = [publisher](const PanoramaEvent& event) { publisher->publish(panorama_message(event)); };
   return hooks;
@@ -158,8 +169,10 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   auto control = arguments.control.empty() ? Result<std::unique_ptr<ControlLines>>()
                                            : ControlLines::open(arguments.control, context.log);
   if (!control) return failure(control);
-  auto outcome =
-      run_input(context, arguments, request, live_hooks(context, progress, publisher->get(), control->get()));
+  ServiceNotifier service;
+  auto outcome = run_input(context, arguments, request,
+                           live_hooks(context, progress, {publisher->get(), control->get(), service}));
+  service.stopping();
   if (!outcome) return failure(outcome);
   std::string text = run_summary_text(outcome->summary_json, arguments.output);
   if (!arguments.truth.empty() && !outcome->interrupted) {

@@ -1,8 +1,12 @@
 // `spartan run` over a live stream: pace, messages, clean end, watchdog.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <fstream>
 #include <map>
@@ -117,6 +121,47 @@ for i in $(seq 100); do sleep 0.05; if exec 3<> "/dev/tcp/127.0.0.1/$target"; th
 timeout 60 cat <&3 > "$messages")");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_GT(messages_in(read_file(path("messages")).value()).at("health").size(), 5U);
+}
+
+TEST_F(RunLive, ALineInTheControlFifoEndsIt) {
+  const auto begin = std::chrono::steady_clock::now();
+  const ProgramResult result = run_with_reader(path("control"),
+                                               R"("$program" "$@" --passes 40 --control "$target" 2> "$messages" &
+for i in $(seq 200); do sleep 0.05; [ -p "$target" ] && break; done
+sleep 0.5; printf 'dance\nstop\n' > "$target")");
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_LT(seconds, 30) << "of 65";
+  EXPECT_THAT(read_file(path("messages")).value(), HasSubstr("'dance' is no command of a run"));
+  EXPECT_TRUE(read_file(path("live/summary.json")));
+  const ProgramResult no_fifo = run_live("other", {"--control", path("messages")});
+  EXPECT_EQ(no_fifo.exit_code, 5);
+  EXPECT_THAT(no_fifo.err, HasSubstr("is no FIFO"));
+}
+
+TEST_F(RunLive, TellsAServiceManagerThatItIsReady) {
+  const int server = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string name = path("notify");
+  ASSERT_LT(name.size(), sizeof(address.sun_path));
+  std::copy(name.begin(), name.end(), address.sun_path);
+  ASSERT_EQ(::bind(server, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  std::vector<std::string> all{name};
+  for (const std::string& word : words("live", {"--speed", "4", "-q"})) all.push_back(word);
+  const ProgramResult result = run_in_shell(R"(NOTIFY_SOCKET=$1; export NOTIFY_SOCKET; shift; exec "$0" "$@")", all);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  std::vector<std::string> messages;
+  for (std::array<char, 512> bytes{};;) {
+    const ssize_t n = ::recv(server, bytes.data(), bytes.size(), MSG_DONTWAIT);
+    if (n <= 0) break;
+    messages.emplace_back(bytes.data(), static_cast<std::size_t>(n));
+  }
+  ::close(server);
+  ASSERT_GE(messages.size(), 3U);
+  EXPECT_THAT(messages.front(), HasSubstr("READY=1\nWATCHDOG=1\nSTATUS=frame 0, odometry"));
+  EXPECT_THAT(messages[1], ::testing::StartsWith("WATCHDOG=1\n"));
+  EXPECT_EQ(messages.back(), "STOPPING=1\n");
 }
 
 TEST_F(RunLive, RejectsWhatCannotBePublishedTo) {

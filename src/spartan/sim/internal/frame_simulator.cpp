@@ -7,6 +7,7 @@
 
 #include "spartan/core/stage_clock.h"
 #include "spartan/sim/internal/drive/body_motion.h"
+#include "spartan/sim/internal/drive/motion_sensors.h"
 #include "spartan/sim/internal/drive/rover_seed.h"
 #include "spartan/sim/internal/world/wheel_tracks.h"
 

@@ -154,12 +154,11 @@ void Panorama::report(bool begins) {
 }
 
 void Panorama::take_all() {
-  std::vector<double> tilts_rad;
-  for (const double tilt_deg : options_.tilts_deg) tilts_rad.push_back(tilt_deg * kDegree);
-  if (tilts_rad.empty()) tilts_rad.push_back(rest_.tilt_rad);
-  for (const double tilt_rad : tilts_rad) {
+  std::vector<double> tilts_deg = options_.tilts_deg;
+  if (tilts_deg.empty()) tilts_deg = {rest_.tilt_rad / kDegree};
+  for (const double tilt_deg : tilts_deg) {
     for (const double pan_deg : options_.pans_deg) {
-      if (!look_at({pan_deg * kDegree, tilt_rad})) break;
+      if (!look_at({pan_deg * kDegree, tilt_deg * kDegree})) break;
     }
   }
   set_phase(Phase::moving);
@@ -184,11 +183,12 @@ Result<PanTiltReading> Panorama::settle(const PanTiltAngles& angles) {
   const auto until = Clock::now() + std::chrono::duration<double>(options_.timeout_s);
   if (Status moved = unit_.move_to(angles); !moved) return failure(moved);
   for (;;) {
-    const auto reading = unit_.read();
+    auto reading = unit_.read();
     if (!reading || !reading->moves) return reading;
-    if (Clock::now() > until)
+    if (Clock::now() > until) {
       return failure(ErrorCode::read_error,
                      fmt::format("the pan-tilt unit still moves after {:.1f} s", options_.timeout_s));
+    }
     if (!wait(kPoll)) return failure(ErrorCode::interrupted, "ends early");
   }
 }

@@ -1,0 +1,48 @@
+#include "program/service_notifier.h"
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdlib>
+
+namespace spartan::program {
+
+ServiceNotifier::ServiceNotifier() {
+  const char* const address = std::getenv("NOTIFY_SOCKET");
+  if (address == nullptr || (address[0] != '/' && address[0] != '@')) return;
+  address_ = address;
+  if (address_.size() >= sizeof(sockaddr_un::sun_path)) return;
+  socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+}
+
+ServiceNotifier::~ServiceNotifier() {
+  if (socket_ >= 0) ::close(socket_);
+}
+
+void ServiceNotifier::send(const std::string& text) const {
+  if (socket_ < 0) return;
+  sockaddr_un to{};
+  to.sun_family = AF_UNIX;
+  std::copy(address_.begin(), address_.end(), to.sun_path);
+  if (address_[0] == '@') to.sun_path[0] = '\0';  // an abstract socket
+  const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + address_.size());
+  static_cast<void>(
+      ::sendto(socket_, text.data(), text.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to), length));
+}
+
+void ServiceNotifier::frame(const std::string& status) {
+  const auto now = std::chrono::steady_clock::now();
+  if (ready_ && now - sent_ < std::chrono::milliseconds(500)) return;
+  send(std::string(ready_ ? "" : "READY=1\n") + "WATCHDOG=1\nSTATUS=" + status);
+  ready_ = true;
+  sent_ = now;
+}
+
+void ServiceNotifier::stopping() {
+  if (ready_) send("STOPPING=1\n");
+}
+
+}  // namespace spartan::program
