@@ -123,18 +123,18 @@ timeout 60 cat <&3 > "$messages")");
   EXPECT_GT(messages_in(read_file(path("messages")).value()).at("health").size(), 5U);
 }
 
+// A line that is no command changes nothing.
 TEST_F(RunLive, ALineInTheControlFifoEndsIt) {
   const auto begin = std::chrono::steady_clock::now();
   const ProgramResult result = run_with_reader(path("control"),
-                                               R"("$program" "$@" --passes 40 --control "$target" 2> "$messages" &
+                                               R"("$program" "$@" --passes 40 --control "$target" &
 for i in $(seq 200); do sleep 0.05; [ -p "$target" ] && break; done
-sleep 0.5; printf 'dance\nstop\n' > "$target")");
+sleep 0.5; printf 'not a command\nstop\n' > "$target")");
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_LT(seconds, 30) << "of 65";
-  EXPECT_THAT(read_file(path("messages")).value(), HasSubstr("'dance' is no command of a run"));
   EXPECT_TRUE(read_file(path("live/summary.json")));
-  const ProgramResult no_fifo = run_live("other", {"--control", path("messages")});
+  const ProgramResult no_fifo = run_live("other", {"--control", path("live/summary.json")});
   EXPECT_EQ(no_fifo.exit_code, 5);
   EXPECT_THAT(no_fifo.err, HasSubstr("is no FIFO"));
 }
