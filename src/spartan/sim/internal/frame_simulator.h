@@ -84,7 +84,7 @@ class FrameSimulator {
   Exposure exposure_for(const PlannedFrame& metered, const LitScene& lit) const;
 
   const SimulationRequest& request_;
-  const ThreadPool& workers_;
+  ThreadPool workers_;
   const Scenario& scenario_;
   World world_;
   Rig nominal_, rig_;
