@@ -57,6 +57,12 @@ spartan::Camera camera(const char* name) {
   return camera;
 }
 
+// In the middle of the image.
+double distance_in(const spartan::TerrainView& terrain) {
+  const float disparity = terrain.disparity(kWidth / 2, kHeight / 2);
+  return terrain.geometry.focal_px * terrain.geometry.baseline_m / disparity;
+}
+
 }  // namespace
 
 int main() {
@@ -83,11 +89,10 @@ int main() {
       return 1;
     }
     world_from_body = (*result)->world_from_body.pose;
-    if (const auto& terrain = (*result)->terrain) {
-      const float disparity = terrain->disparity(kWidth / 2, kHeight / 2);
-      wall_m = terrain->pair.geometry.focal_px * terrain->pair.geometry.baseline_m / disparity;
-    }
+    if ((*result)->terrain) wall_m = distance_in(*(*result)->terrain);
   }
+  // Terrain comes some frames later: the last view, after the last frame.
+  if (const auto terrain = pipeline->finish_terrain()) wall_m = distance_in(*terrain);
   // The body looks along x with y to the left.
   const double driven_m = -world_from_body.translation().y();
   std::printf("driven %.4f m to the right (truth %.2f), wall at %.3f m (truth %.1f)\n", driven_m,
