@@ -259,7 +259,7 @@ void add_run(CLI::App& app, Context& context) {
   command->add_option(
       "--control", a->control,
       "Of a live run: a FIFO, created if there is none, whose lines are commands: panorama takes one as "
-      "soon as the rover is stationary, stop ends the run.");
+      "soon as the rover is stationary, stop ends the run (default: none).");
   command->add_flag("--no-recording", a->no_recording,
                     "Of a live run: do not record the stream in the folder `live` of the run.");
   add_recorded_images_option(*command, a->record_images);
