@@ -133,7 +133,7 @@ Drive drive(const Event& event, double delay_ms, bool controlled) {
   if (event.first) static_cast<void>(live.set_exposure("narrow", *event.first));
   Drive result;
   Pose first_body, last_body, first_true, last_true;
-  double path_m = 0;
+  double path_m = 0, brightest = -1, darkest = 2;
   const auto next = [&] { return live.read(std::chrono::nanoseconds(0)); };
   for (auto read = next(); read && read->sample; read = next()) {
     const auto* frame = std::get_if<StereoFrame>(&*read->sample);
@@ -151,13 +151,14 @@ Drive drive(const Event& event, double delay_ms, bool controlled) {
       last_body = (*done)->world_from_body.pose;
       last_true = truth;
     }
-    const auto median = [](const Drive& d, bool low) {
-      const auto less = [](const FrameState& a, const FrameState& b) { return a.ground.median < b.ground.median; };
-      return low ? std::min_element(d.frames.begin(), d.frames.end(), less)->ground.median
-                 : std::max_element(d.frames.begin(), d.frames.end(), less)->ground.median;
-    };
-    if (result.frames.empty() || state.ground.median > median(result, false)) result.brightest = *frame;
-    if (result.frames.empty() || state.ground.median < median(result, true)) result.darkest = *frame;
+    if (state.ground.median > brightest) {
+      brightest = state.ground.median;
+      result.brightest = *frame;
+    }
+    if (state.ground.median < darkest) {
+      darkest = state.ground.median;
+      result.darkest = *frame;
+    }
     result.frames.push_back(state);
   }
   const Pose error = (first_true.inverse() * last_true).inverse() * (first_body.inverse() * last_body);

@@ -91,6 +91,12 @@ bool LiveSimulation::is_on_mast(const std::string& pair) const {
   return request_->rig.find_camera(request_->rig.find_pair(pair)->left)->mount != "body";
 }
 
+PanTiltControl* LiveSimulation::pan_tilt() {
+  const std::vector<StereoPair>& pairs = request_->rig.pairs;
+  const bool moves = std::any_of(pairs.begin(), pairs.end(), [&](const StereoPair& p) { return is_on_mast(p.name); });
+  return moves ? this : nullptr;
+}
+
 // With the lock. While an image is rendered, the rover's time stands still.
 Stamp LiveSimulation::now() const {
   if (!start_) return start_stamp_;

@@ -27,7 +27,8 @@ class LiveSimulation : public SampleStream, public CameraControl, public PanTilt
   const StreamInfo& info() const override { return info_; }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
   CameraControl* control() override { return this; }
-  PanTiltControl* pan_tilt() override { return this; }
+  /// Null where no camera of the rig is on a pan-tilt unit.
+  PanTiltControl* pan_tilt() override;
   void start_after(Stamp stamp) override { start_after_ = stamp; }
   /// The first frame of each pair.
   std::size_t previews(const std::string& pair) const override { return first_frame(pair) ? 1 : 0; }

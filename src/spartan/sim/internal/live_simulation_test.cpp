@@ -174,6 +174,13 @@ TEST(LiveSimulation, TheMastLooksWhereItIsToldToAndWaitsForTriggers) {
   }
 }
 
+TEST(LiveSimulation, HasNoPanTiltUnitWhereNoCameraIsOnOne) {
+  SimulationRequest request = request_of();
+  EXPECT_NE(LiveSimulation(request, 0, ThreadPool(1)).pan_tilt(), nullptr);
+  std::erase_if(request.rig.pairs, [](const StereoPair& pair) { return pair.name == "wide"; });
+  EXPECT_EQ(LiveSimulation(request, 0, ThreadPool(1)).pan_tilt(), nullptr);
+}
+
 TEST(LiveSimulation, ThePanTiltUnitTakesItsTime) {
   LiveSimulation live(request_of(), 0, ThreadPool(1));
   const auto rest = live.read();
