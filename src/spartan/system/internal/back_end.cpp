@@ -43,11 +43,12 @@ void BackEnd::run_next(Lock& lock) {
   const Job job = std::move(jobs_.front());
   jobs_.pop_front();
   busy_ = true;
+  const bool failed = error_ != nullptr;  // a job before: this one may build on what that has left unfinished
   lock.unlock();
   std::exception_ptr error;
   running_.begin(job.name);
   try {
-    job.work();
+    if (!failed) job.work();
   } catch (...) {  // none is lost: wait() rethrows it in the thread that needs the result
     error = std::current_exception();
   }

@@ -35,7 +35,8 @@ class BackEnd {
   bool is_done(Ticket ticket) const;
   /// Number of jobs that have not ended.
   std::uint64_t backlog() const;
-  /// Returns when the job and all before it have ended. Rethrows what a job has thrown, at each call.
+  /// Returns when the job and all before it have ended. Rethrows what a job has thrown, at each call; jobs after that
+  /// one do not run.
   void wait(Ticket ticket);
   /// The job that runs now.
   const RunningStage& running() const { return running_; }

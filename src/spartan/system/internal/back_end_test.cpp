@@ -69,6 +69,15 @@ TEST_P(BackEndTest, RethrowsWhatAJobHasThrown) {
   EXPECT_THROW(back_end_.wait(thrown), std::runtime_error);
 }
 
+TEST_P(BackEndTest, JobsAfterOneThatHasThrownDoNotRun) {
+  std::atomic<int> ran = 0;
+  back_end_.submit("job", [&] { ++ran; });
+  back_end_.submit("job", [] { throw std::runtime_error("no memory"); });
+  const BackEnd::Ticket last = back_end_.submit("job", [&] { ++ran; });
+  EXPECT_THROW(back_end_.wait(last), std::runtime_error);
+  EXPECT_EQ(ran, 1);
+}
+
 TEST_P(BackEndTest, JobsThatHaveNotBegunNeverRunAfterItsEnd) {
   std::atomic<int> ran = 0;
   {
