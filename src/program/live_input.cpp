@@ -32,7 +32,11 @@ bool is_live_input(const std::string& input) {
 
 Result<std::unique_ptr<SampleStream>> open_live_input(const Context& context, const std::string& address,
                                                       const OpenOptions& open, const LiveArguments& arguments) {
-  if (!address.starts_with(kSimulation)) return open_live_stream(address, open, arguments.options);
+  if (!address.starts_with(kSimulation)) {
+    LiveOptions options = arguments.options;
+    options.log = context.log;
+    return open_live_stream(address, open, options);
+  }
   SimulationArguments simulation;
   simulation.scenario = address.substr(kSimulation.size());
   simulation.set = arguments.scenario_keys;

@@ -24,7 +24,7 @@ void add_live_options(CLI::App& command, LiveArguments& arguments);
 /// Whether an input is the address of a live stream, and not a recording.
 bool is_live_input(const std::string& input);
 
-/// Opens `replay:FOLDER` (open_live_stream()) or `sim:SCENARIO` (open_simulation()).
+/// Opens `sim:SCENARIO` (open_simulation()), or what open_live_stream() opens.
 Result<std::unique_ptr<SampleStream>> open_live_input(const Context& context, const std::string& address,
                                                       const OpenOptions& open, const LiveArguments& arguments);
 

@@ -9,8 +9,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "spartan/camera/samples.h"
+#include "spartan/core/log.h"
 #include "spartan/core/result.h"
 #include "spartan/rig/rig.h"
 
@@ -48,6 +50,36 @@ struct StreamRead {
   std::optional<Sample> sample;                   ///< with State::sample
   std::chrono::steady_clock::time_point arrived;  ///< when the host had the sample complete
 };
+
+/// What one camera of a live stream has delivered so far.
+struct CameraReport {
+  std::string camera;
+  std::int64_t images = 0;        ///< complete ones
+  std::int64_t incomplete = 0;    ///< packets of them were lost
+  std::int64_t not_received = 0;  ///< left out in the count of the camera
+  std::int64_t duplicates = 0, reversed = 0;  ///< discarded: the same image again; one from before
+  std::int64_t wrong_stamps = 0;              ///< the time of the image was taken from its arrival
+  std::int64_t triggers = 0;                  ///< sent by software
+  std::int64_t unanswered = 0;                ///< triggers without an image
+  std::int64_t untriggered = 0;               ///< images without a trigger, or long after it, of a triggered camera
+  std::int64_t losses = 0;                    ///< how often it no longer answered
+  double clock_sigma_ms = 0;                  ///< standard deviation of the newest stamp on the clock of the host
+  double clock_rate_ppm = 0;                  ///< by how much the host's clock is faster than that of the camera
+};
+
+/// What the cameras of a pair have delivered together since the first call of SampleStream::read().
+struct CameraPairReport {
+  std::string pair;
+  std::int64_t pairs = 0;                        ///< frames with both images
+  std::int64_t left_alone = 0, right_alone = 0;  ///< images without one of the other camera
+  std::int64_t incomplete = 0;                   ///< frames with an image that is not complete
+  std::int64_t wrong_size = 0, stamps_reversed = 0, not_taken = 0;  ///< frames; images that waited for too long
+  double mean_skew_ms = 0, largest_skew_ms = 0;                     ///< stamp of the right image minus the left one
+  std::vector<CameraReport> cameras;                                ///< left, right
+};
+
+/// One line of a log: what was delivered, and everything else that is not zero.
+std::string describe(const CameraPairReport& report);
 
 /// Exposure of an image.
 struct ExposureSettings {
@@ -111,6 +143,9 @@ class SampleStream {
 
   virtual DiscardedSamples discarded() const { return {}; }
 
+  /// Of the pairs whose cameras run now. Can be called while another thread reads the stream.
+  virtual std::vector<CameraPairReport> camera_reports() const { return {}; }
+
   /// Null where the cameras cannot be controlled. Borrowed.
   virtual CameraControl* control() { return nullptr; }
   /// The pan-tilt unit behind the stream; null where there is none. Borrowed.
@@ -130,13 +165,21 @@ class SampleStream {
 struct LiveOptions {
   double speed = 1;  ///< of a stream that is not real: seconds of its stamps in a second
   int passes = 1;    ///< how often a recording is played
+  Log log = {};      ///< of cameras that are lost and found again
 };
 
 /// Whether an input is the address of a live stream ("replay:FOLDER") and not the folder of a recording.
 bool is_live_address(std::string_view input);
 
-/// Opens a live stream: `replay:FOLDER`, a recording whose samples arrive at the pace of their stamps. Codes: `usage`
-/// (no such kind of stream, speed or passes not positive), and those of open_recording().
+/// Opens a live stream:
+/// - `replay:FOLDER`: a recording whose samples arrive at the pace of their stamps;
+/// - `live:RIG`: the cameras that have a driver in a rig file;
+/// - `aravis:LEFT,RIGHT`: two GenICam cameras (GigE Vision, USB3 Vision) by their ids or addresses, `gst:PIPELINE`: a
+///   pipeline of GStreamer with a side-by-side image or two sinks `left` and `right`; for the odometry's pair of
+///   OpenOptions::rig_file, with what the drivers of its cameras state besides.
+///
+/// Codes: `usage` (no such kind of stream, speed or passes not positive), `configuration` (drivers, or no plugin for
+/// them), `read_error` (cameras), and those of open_recording() and read_rig_yaml().
 Result<std::unique_ptr<SampleStream>> open_live_stream(const std::string& address, const OpenOptions& open,
                                                        const LiveOptions& options);
 

@@ -61,6 +61,14 @@ class FrameImage {
     image.owner_ = std::move(owner);
     return image;
   }
+  /// Shares pixels that `owner` keeps alive and unchanged, such as a buffer of a camera or a part of an image; throws
+  /// as borrow().
+  template <class Pixel>
+  static FrameImage share(ImageView<const Pixel> view, PixelFormat format, std::shared_ptr<const void> owner) {
+    FrameImage image = borrow(view, format);
+    image.owner_ = std::move(owner);
+    return image;
+  }
 
   /// The same pixels with another format (Bayer phase, number of bits); throws std::invalid_argument if the number of
   /// channels or bytes per sample differs.

@@ -153,6 +153,14 @@ class FaultFinder {
       add(key + ".mount", fmt::format("'{}' is neither 'body' nor a pan-tilt unit of this rig", camera.mount));
     }
     check_pose(key, camera.mount_from_camera);
+    if (camera.driver) check_driver(key + ".driver", camera);
+  }
+
+  void check_driver(const std::string& key, const Camera& camera) {
+    if (camera.driver->source.empty()) add(key + ".source", "must name a camera, e.g. aravis:ID");
+    if (camera.driver->trigger.empty()) add(key + ".trigger", "must be free, software, or an input of the camera");
+    if (!(camera.driver->black_level < camera.pixel_format.full_scale()))
+      add(key + ".black_level", fmt::format("must be below {}, the largest value", camera.pixel_format.full_scale()));
   }
 
   const Camera* find_pair_camera(const std::string& key, const std::string& name) {
@@ -200,7 +208,7 @@ bool operator==(const PanTiltUnit& a, const PanTiltUnit& b) {
 bool operator==(const Camera& a, const Camera& b) {
   return a.name == b.name && a.size == b.size && a.model == b.model && a.pixel_format == b.pixel_format &&
          a.vignetting == b.vignetting && a.self_mask == b.self_mask && a.mount == b.mount &&
-         equal_bits(a.mount_from_camera, b.mount_from_camera);
+         equal_bits(a.mount_from_camera, b.mount_from_camera) && a.driver == b.driver;
 }
 
 const Camera* Rig::find_camera(const std::string& camera) const {

@@ -47,6 +47,23 @@ struct PanTiltUnit {
   friend bool operator==(const PanTiltUnit&, const PanTiltUnit&);  ///< bit for bit, as for all of a rig
 };
 
+/// Which moment of the exposure a camera states with an image.
+enum class StampAt { exposure_start, exposure_middle, exposure_end };
+
+/// How a camera is reached and set in a live run.
+struct CameraDriver {
+  static constexpr const char* kFree = "free";          ///< the camera takes images by itself
+  static constexpr const char* kSoftware = "software";  ///< Spartan triggers each image
+
+  std::string source;           ///< "aravis:ID" or "gst:PIPELINE"; both cameras of a pair may name the same one
+  std::string trigger = kFree;  ///< kFree, kSoftware, or the name of an input of the camera, e.g. "Line1"
+  double rate_hz = 0;           ///< frames per second; 0: as the camera is set (free), or only on command (software)
+  double black_level = 0;       ///< value of a stored sample without light
+  StampAt stamp_at = StampAt::exposure_start;
+  double latency_ms = 0;  ///< from the end of an exposure to the arrival of the first bytes, at least
+  friend bool operator==(const CameraDriver&, const CameraDriver&) = default;
+};
+
 /// One camera: image size, camera model, photometric properties and pose on its mount.
 struct Camera {
   std::string name;
@@ -57,6 +74,7 @@ struct Camera {
   std::string self_mask;       ///< image file, 0 where the rover is visible; empty: none. Relative to the rig file
   std::string mount = "body";  ///< "body" or the name of a pan-tilt unit
   Pose mount_from_camera;      ///< camera: optical frame (x right, y down, z forward)
+  std::optional<CameraDriver> driver = {};  ///< none: a camera of recordings
   friend bool operator==(const Camera&, const Camera&);
 };
 

@@ -9,6 +9,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/pose.h"
 #include "spartan/core/strict_yaml.h"
+#include "spartan/rig/internal/camera_driver.h"
 #include "spartan/rig/rig.h"
 
 namespace spartan {
@@ -150,6 +151,8 @@ Camera read_camera(const std::string& name, YamlMap map) {
   const auto axes = map.choice("axes", {"optical", "forward"});
   camera.mount_from_camera = read_pose(map);
   if (axes == "forward") camera.mount_from_camera = camera.mount_from_camera * optical_from_forward().inverse();
+  if (const auto driver = map.optional_node("driver"))
+    camera.driver = internal::read_camera_driver(YamlMap(*driver, map.path("driver"), map.errors()));
   map.reject_unknown_keys();
   return camera;
 }
@@ -277,7 +280,8 @@ std::string camera_lines(const Camera& camera) {
   }
   if (!camera.self_mask.empty()) text += fmt::format("    self_mask: {}\n", yaml_quoted(camera.self_mask));
   return text + fmt::format("    mount: {}\n    axes: optical\n{}", yaml_quoted(camera.mount),
-                            pose_lines(camera.mount_from_camera));
+                            pose_lines(camera.mount_from_camera)) +
+         (camera.driver ? internal::camera_driver_lines(*camera.driver) : "");
 }
 
 std::string pair_lines(const StereoPair& pair) {

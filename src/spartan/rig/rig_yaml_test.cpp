@@ -46,6 +46,31 @@ TEST(RigYaml, ReadsVignetting) {
   EXPECT_THAT(error_for("axes: optical, ", "vignetting: [.nan], axes: optical, "), HasSubstr("cameras.l.vignetting"));
 }
 
+TEST(RigYaml, ReadsTheDriverOfACamera) {
+  EXPECT_FALSE(parse_rig_yaml(kGood, "my.yaml")->cameras[0].driver);
+  const auto with = [](const std::string& driver) {
+    return replaced(kGood, "axes: optical, ", "driver: " + driver + ", axes: optical, ");
+  };
+  const auto rig = parse_rig_yaml(
+      with("{source: 'aravis:Vendor-7', trigger: software, rate_hz: 12.5, black_level: 16, stamp_at: exposure_end, "
+           "latency_ms: 3.5}"),
+      "my.yaml");
+  ASSERT_TRUE(rig) << rig.error().message();
+  const CameraDriver wanted{"aravis:Vendor-7", CameraDriver::kSoftware, 12.5, 16, StampAt::exposure_end, 3.5};
+  EXPECT_EQ(rig->cameras[0].driver, wanted);
+  EXPECT_EQ(*parse_rig_yaml(to_rig_yaml(*rig), "again.yaml"), *rig);
+  EXPECT_EQ(parse_rig_yaml(with("{source: 'gst:videotestsrc'}"), "my.yaml")->cameras[0].driver,
+            (CameraDriver{"gst:videotestsrc"}));
+  const auto fault = [&](const std::string& driver) {
+    return testing::error_message(parse_rig_yaml(with(driver), "my.yaml"));
+  };
+  EXPECT_THAT(fault("{trigger: free}"), HasSubstr("cameras.l.driver.source"));
+  EXPECT_THAT(fault("{source: a, rate_hz: -1}"), HasSubstr("cameras.l.driver.rate_hz: is -1"));
+  EXPECT_THAT(fault("{source: a, black_level: 255}"), HasSubstr("driver.black_level: must be below 255"));
+  EXPECT_THAT(fault("{source: a, stamp_at: noon}"), HasSubstr("cameras.l.driver.stamp_at"));
+  EXPECT_THAT(fault("{source: a, colour: red}"), HasSubstr("cameras.l.driver.colour"));
+}
+
 TEST(RigYaml, ReadsTheGeometryOfTheRover) {
   EXPECT_EQ(parse_rig_yaml(kGood, "my.yaml")->rover, RoverGeometry());
   const auto rig = parse_rig_yaml(kGood + "rover: {track_m: 0.35, clearance_m: 0.06}\n", "my.yaml");

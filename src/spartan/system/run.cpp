@@ -182,6 +182,7 @@ RunFacts facts_of(const RunRequest& request, const RunSource& source, const RunO
   facts.format = source.recording ? name_of(source.recording->info().format) : "live";
   if (source.queue) {
     facts.live = LiveFacts{run_loop.latencies(), source.queue->dropped(), source.queue->peak_bytes(), 0, {}};
+    facts.live->cameras = source.queue->camera_reports();
     if (StreamRecorder* const recorder = source.queue->recorder()) facts.live->recording = recorder->progress();
   }
   facts.gravity_measured = run_loop.gravity_measured();
@@ -296,6 +297,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   if (!processed) return failure(processed);
   report_sensor_rows(source.stream, hooks.log);
   if (source.queue) report_dropped(*source.queue, hooks.log);
+  for (const CameraPairReport& report : source.stream.camera_reports()) hooks.log.info(describe(report));
   if (run_loop.usable_frames() == 0 && !run_loop.stopped()) {
     // An empty run folder would block the next attempt.
     if (prepared->state == FolderState::created) remove_run_folder(folder);

@@ -1,16 +1,15 @@
 #include "spartan/camera/internal/video.h"
 
-#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cstdlib>
 #include <filesystem>
 #include <string_view>
 #include <utility>
 
+#include "spartan/camera/internal/plugin_library.h"
 #include "spartan/camera/internal/video_plugin.h"
 
 namespace spartan::internal {
@@ -18,20 +17,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kPlugin = "libspartan_video.so";
 constexpr std::array<std::string_view, 12> kExtensions{".mp4", ".m4v", ".mov", ".avi",  ".mkv",  ".webm",
                                                        ".mpg", ".ts",  ".wmv", ".mpeg", ".h264", ".mjpeg"};
-
-// The plugin in the environment, beside the program (a build folder), or in the library path of the program.
-void* load_plugin() {
-  if (const char* given = std::getenv("SPARTAN_VIDEO")) return ::dlopen(given, RTLD_NOW | RTLD_LOCAL);
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  for (const fs::path& folder : {program.parent_path(), program.parent_path().parent_path() / "lib" / "spartan"}) {
-    if (void* library = ::dlopen((folder / kPlugin).c_str(), RTLD_NOW | RTLD_LOCAL)) return library;
-  }
-  return ::dlopen(kPlugin, RTLD_NOW | RTLD_LOCAL);
-}
 
 }  // namespace
 
@@ -42,27 +29,21 @@ bool is_video_name(const std::string& path) {
   return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
 }
 
-// The library stays loaded: its dependencies do not support unloading.
 struct Video::Plugin {
   decltype(&spartan_video_open) open = nullptr;
   decltype(&spartan_video_next) next = nullptr;
   decltype(&spartan_video_close) close = nullptr;
 
   static Result<std::shared_ptr<const Plugin>> load() {
-    void* const library = load_plugin();
+    const auto library = PluginLibrary::load("libspartan_video.so", "SPARTAN_VIDEO", "videos need", "extract the images");
+    if (!library) return failure(library);
     auto plugin = std::make_shared<Plugin>();
-    const auto find = [&](const char* name, auto& function) {
-      function =
-          library == nullptr ? nullptr : reinterpret_cast<std::decay_t<decltype(function)>>(::dlsym(library, name));
-      return function != nullptr;
-    };
-    if (find("spartan_video_open", plugin->open) && find("spartan_video_next", plugin->next) &&
-        find("spartan_video_close", plugin->close))
-      return plugin;
-    const char* const reason = ::dlerror();
-    return failure(ErrorCode::configuration,
-                   fmt::format("videos need the plugin {}: {}", kPlugin, reason == nullptr ? "not found" : reason), "",
-                   "set SPARTAN_VIDEO to its path, or extract the images");
+    for (const Status& found :
+         {library->find("spartan_video_open", plugin->open), library->find("spartan_video_next", plugin->next),
+          library->find("spartan_video_close", plugin->close)}) {
+      if (!found) return failure(found);
+    }
+    return plugin;
   }
 };
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <thread>
 #include <type_traits>
+#include <vector>
 
 #include "spartan/camera/sample_stream.h"
 #include "spartan/core/log.h"
@@ -130,6 +131,7 @@ class PanoramaStream : public SampleStream {
   const StreamInfo& info() const override { return stream_.info(); }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
   DiscardedSamples discarded() const override { return stream_.discarded(); }
+  std::vector<CameraPairReport> camera_reports() const override { return stream_.camera_reports(); }
   CameraControl* control() override { return stream_.control(); }
   PanTiltControl* pan_tilt() override { return stream_.pan_tilt(); }
   void start_after(Stamp stamp) override { stream_.start_after(stamp); }

@@ -7,6 +7,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "spartan/camera/recording_writer.h"
 #include "spartan/camera/sample_stream.h"
@@ -28,6 +29,7 @@ class QueuedStream : public SampleStream {
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
   /// Only after the end.
   DiscardedSamples discarded() const override { return stream_.discarded(); }
+  std::vector<CameraPairReport> camera_reports() const override { return stream_.camera_reports(); }
   void start_after(Stamp stamp) override { stream_.start_after(stamp); }
   CameraControl* control() override { return stream_.control(); }
   std::size_t previews(const std::string& pair) const override { return stream_.previews(pair); }

@@ -25,6 +25,7 @@ class ResumedStream : public SampleStream {
   const StreamInfo& info() const override { return live_.info(); }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
   DiscardedSamples discarded() const override { return live_.discarded(); }
+  std::vector<CameraPairReport> camera_reports() const override { return live_.camera_reports(); }
   CameraControl* control() override { return live_.control(); }
   std::size_t previews(const std::string& pair) const override { return live_.previews(pair); }
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {

@@ -81,6 +81,42 @@ Json exposure(const std::optional<ExposureStatistics>& statistics) {
           {"dark_frames", statistics->dark_frames}};
 }
 
+Json camera(const CameraReport& report) {
+  return {{"camera", report.camera},
+          {"images", report.images},
+          {"incomplete", report.incomplete},
+          {"not_received", report.not_received},
+          {"duplicates", report.duplicates},
+          {"reversed", report.reversed},
+          {"wrong_stamps", report.wrong_stamps},
+          {"triggers", report.triggers},
+          {"unanswered", report.unanswered},
+          {"untriggered", report.untriggered},
+          {"losses", report.losses},
+          {"clock_sigma_ms", report.clock_sigma_ms},
+          {"clock_rate_ppm", report.clock_rate_ppm}};
+}
+
+Json camera_pairs(const std::vector<CameraPairReport>& reports) {
+  Json pairs = Json::array();
+  for (const CameraPairReport& report : reports) {
+    Json cameras = Json::array();
+    for (const CameraReport& one : report.cameras) cameras.push_back(camera(one));
+    pairs.push_back({{"pair", report.pair},
+                     {"frames", report.pairs},
+                     {"left_alone", report.left_alone},
+                     {"right_alone", report.right_alone},
+                     {"incomplete", report.incomplete},
+                     {"wrong_size", report.wrong_size},
+                     {"stamps_reversed", report.stamps_reversed},
+                     {"not_taken", report.not_taken},
+                     {"mean_skew_ms", report.mean_skew_ms},
+                     {"largest_skew_ms", report.largest_skew_ms},
+                     {"cameras", cameras}});
+  }
+  return pairs;
+}
+
 // Null of a recording.
 Json live(const std::optional<LiveFacts>& facts) {
   if (!facts) return nullptr;
@@ -94,7 +130,8 @@ Json live(const std::optional<LiveFacts>& facts) {
           {"queue_peak_bytes", facts->queue_peak_bytes},
           {"files_discarded", facts->files_discarded},
           {"recording", recording(facts->recording)},
-          {"exposure", exposure(facts->exposure)}};
+          {"exposure", exposure(facts->exposure)},
+          {"cameras", camera_pairs(facts->cameras)}};
 }
 
 // Consecutive frames without a pose.

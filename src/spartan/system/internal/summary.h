@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "spartan/camera/recording_writer.h"
+#include "spartan/camera/sample_stream.h"
 #include "spartan/core/time.h"
 #include "spartan/system/internal/exposure_stage.h"
 #include "spartan/system/internal/latency_record.h"
@@ -23,6 +24,7 @@ struct LiveFacts {
   std::int64_t files_discarded = 0;              ///< terrain views and maps whose files the disk was too slow for
   std::optional<RecorderProgress> recording;     ///< of the stream, if it was recorded
   std::optional<ExposureStatistics> exposure{};  ///< of cameras that are controlled
+  std::vector<CameraPairReport> cameras{};       ///< of cameras that run now
 };
 
 /// Facts about a run that are not in its store.

@@ -1,0 +1,335 @@
+#include "spartan/camera/internal/cameras/camera_stream.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace spartan::internal {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// From the start of the threads to the first trigger.
+constexpr std::chrono::milliseconds kFirstTrigger{50};
+
+bool has_driver(const Rig& rig, const std::string& camera) {
+  return rig.find_camera(camera)->driver.has_value();
+}
+
+}  // namespace
+
+CameraStream::CameraStream(const StreamInfo& info, const CameraStreamOptions& options, const Log& log)
+    : info_(info), options_(options), log_(log) {}
+
+CameraStream::~CameraStream() = default;
+
+Result<std::unique_ptr<CameraStream>> CameraStream::create(const StreamInfo& info, OpenDevice open,
+                                                           const CameraStreamOptions& options, const Log& log) {
+  std::unique_ptr<CameraStream> stream(new CameraStream(info, options, log));
+  for (const StereoPair& pair : stream->info_.rig.pairs) {
+    const bool left = has_driver(stream->info_.rig, pair.left), right = has_driver(stream->info_.rig, pair.right);
+    if (left != right) {
+      return failure(ErrorCode::configuration, fmt::format("cameras.{}: has no driver, the other camera of pair {} has one",
+                                                           left ? pair.right : pair.left, pair.name),
+                     info.rig_source);
+    }
+    if (!left) continue;
+    if (Status opened = stream->open_pair(pair, open); !opened) return failure(opened);
+  }
+  if (stream->feeds_.empty()) {
+    return failure(ErrorCode::configuration, "no camera has a driver", info.rig_source,
+                   "add `driver: {source: aravis:ID}` to the cameras of a pair, see docs/reference/rig.md");
+  }
+  stream->start();
+  if (Status waited = stream->wait_for_previews(); !waited) return failure(waited);
+  return stream;
+}
+
+Status CameraStream::open_pair(const StereoPair& pair, const OpenDevice& open) {
+  const Camera* const left = info_.rig.find_camera(pair.left);
+  const Camera* const right = info_.rig.find_camera(pair.right);
+  auto feed = std::make_unique<Feed>(options_);
+  feed->pair = pair;
+  feed->report.pair = pair.name;
+  std::vector<DeviceRequest> requests;
+  if (left->driver->source == right->driver->source) {
+    requests = {{{left, right}}};
+  } else {
+    requests = {{{left}}, {{right}}};
+  }
+  for (DeviceRequest& request : requests) {
+    auto source = ImageSource::create(std::move(request), open, clock_, log_);
+    if (!source) return failure(source);
+    feed->sources.push_back(std::move(*source));
+  }
+  feeds_.push_back(std::move(feed));
+  return {};
+}
+
+void CameraStream::start() {
+  const auto first_trigger = Clock::now() + kFirstTrigger;
+  for (const auto& feed : feeds_) {
+    for (std::size_t i = 0; i < feed->sources.size(); ++i) {
+      const int first_side = static_cast<int>(i);
+      feed->sources[i]->start(
+          first_trigger,
+          [this, f = feed.get(), first_side](int side, StampedImage image) {
+            add(*f, first_side + side, std::move(image));
+          },
+          [this] {
+            const std::lock_guard lock(mutex_);
+            changed_.notify_all();
+          });
+    }
+  }
+}
+
+void CameraStream::add(Feed& feed, int side, StampedImage image) {
+  const std::lock_guard lock(mutex_);
+  if (feed.pairing.waiting(side) >= kMostWaiting) {
+    feed.pairing.drop_oldest(side);
+    ++feed.report.not_taken;
+  }
+  feed.pairing.add(side, std::move(image));
+  changed_.notify_all();
+}
+
+Status CameraStream::wait_for_previews() {
+  const auto until = Clock::now() + options_.first_wait;
+  for (const auto& feed : feeds_) {
+    const CameraDriver& driver = feed->sources.front()->request().driver();
+    if (driver.trigger == CameraDriver::kSoftware && !(driver.rate_hz > 0)) static_cast<void>(trigger(feed->pair.name));
+  }
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    take_all(Clock::now());
+    for (StreamRead& read : samples_) {
+      auto* const frame = std::get_if<StereoFrame>(&*read.sample);
+      if (frame != nullptr) previews_.try_emplace(frame->pair, *frame);
+    }
+    samples_.clear();
+    const auto missing = std::find_if(feeds_.begin(), feeds_.end(),
+                                      [&](const auto& feed) { return !previews_.contains(feed->pair.name); });
+    if (missing == feeds_.end()) return {};
+    if (Clock::now() >= until || all_ended()) {
+      const SourceCounts left = (*missing)->sources.front()->counts(), right = (*missing)->sources.back()->counts();
+      return failure(ErrorCode::read_error,
+                     fmt::format("pair {}: no frame within {:.0f} s ({} images by {}, {} by {})", (*missing)->pair.name,
+                                 std::chrono::duration<double>(options_.first_wait).count(), left.images,
+                                 (*missing)->pair.left, right.images, (*missing)->pair.right),
+                     info_.path,
+                     "check that the cameras run and take their images together; --pair-tolerance allows larger "
+                     "differences of their times");
+    }
+    changed_.wait_until(lock, next_timeout(until));
+  }
+}
+
+bool CameraStream::all_ended() const {
+  return std::all_of(feeds_.begin(), feeds_.end(), [](const auto& feed) {
+    return std::all_of(feed->sources.begin(), feed->sources.end(), [](const auto& source) { return source->ended(); });
+  });
+}
+
+Result<StereoFrame> CameraStream::preview(const std::string& pair, std::size_t index) {
+  const auto found = previews_.find(pair);
+  if (found == previews_.end() || index > 0) return failure(ErrorCode::input, "no such frame", pair);
+  return found->second;
+}
+
+Clock::time_point CameraStream::next_timeout(Clock::time_point latest) const {
+  for (const auto& feed : feeds_) {
+    if (const auto time = feed->pairing.next_timeout()) latest = std::min(latest, *time);
+  }
+  return latest;
+}
+
+Result<StreamRead> CameraStream::read(std::chrono::nanoseconds timeout) {
+  const auto until = Clock::now() + timeout;
+  std::unique_lock lock(mutex_);
+  if (!reading_) {
+    take_all(Clock::now());
+    samples_.clear();
+    for (const auto& feed : feeds_) {
+      feed->report = {};
+      feed->report.pair = feed->pair.name;
+      feed->skew_sum_ms = 0;
+    }
+    reading_ = true;
+  }
+  for (;;) {
+    const bool ended = all_ended();
+    // Nothing can follow an image that waits for its partner.
+    take_all(ended ? Clock::now() + options_.pair_wait : Clock::now());
+    if (!samples_.empty()) {
+      StreamRead read = std::move(samples_.front());
+      samples_.pop_front();
+      return read;
+    }
+    if (ended) return StreamRead{StreamRead::State::end, {}, Clock::now()};
+    if (Clock::now() >= until) return StreamRead{StreamRead::State::none_yet, {}, Clock::now()};
+    changed_.wait_until(lock, next_timeout(until));
+  }
+}
+
+void CameraStream::take_all(Clock::time_point now) {
+  for (const auto& feed : feeds_) {
+    // A partner of a camera that does not answer is not waited for.
+    const bool lost = std::any_of(feed->sources.begin(), feed->sources.end(),
+                                  [](const auto& source) { return source->is_lost(); });
+    while (auto pair = feed->pairing.take(lost ? now + options_.pair_wait : now)) take_pair(*feed, std::move(*pair));
+  }
+}
+
+void CameraStream::take_pair(Feed& feed, ImagePair pair) {
+  Clock::time_point complete = pair.first().image.complete;
+  if (pair.is_complete()) complete = std::max(complete, pair.images[1]->image.complete);
+  push(sample_of(feed, std::move(pair)), complete);
+}
+
+void CameraStream::push(Sample sample, Clock::time_point arrived) {
+  samples_.push_back({StreamRead::State::sample, std::move(sample), arrived});
+}
+
+StereoFrame CameraStream::frame_of(const Feed& feed, const ImagePair& pair) const {
+  StereoFrame frame;
+  frame.pair = feed.pair.name;
+  const Stamp stamp = pair.first().stamp;
+  frame.left_stamp = pair.images[0] ? pair.images[0]->stamp : stamp;
+  frame.right_stamp = pair.images[1] ? pair.images[1]->stamp : stamp;
+  if (pair.images[0]) frame.left = pair.images[0]->image.image;
+  if (pair.images[1]) frame.right = pair.images[1]->image.image;
+  frame.exposure_us = pair.first().image.exposure_us;
+  frame.gain = pair.first().image.gain;
+  const std::string& mount = info_.rig.find_camera(feed.pair.left)->mount;
+  for (const PanTiltUnit& unit : info_.rig.pan_tilt_units) {
+    if (unit.name != mount) continue;
+    frame.pan_rad = unit.rest_pan_rad;
+    frame.tilt_rad = unit.rest_tilt_rad;
+  }
+  return frame;
+}
+
+Sample CameraStream::sample_of(Feed& feed, ImagePair pair) {
+  StereoFrame frame = frame_of(feed, pair);
+  frame.frame_id = next_frame_id_++;
+  if (auto missing = fault_of(feed, pair, frame)) {
+    missing->frame_id = frame.frame_id;
+    missing->pair = frame.pair;
+    missing->stamp = frame.left_stamp;
+    const bool one_image = frame.left.empty() != frame.right.empty();
+    if (one_image && missing->fault != FrameFault::stamp_reversed) missing->partial = std::move(frame);
+    return std::move(*missing);
+  }
+  ++feed.report.pairs;
+  const double skew_ms = seconds_between(frame.left_stamp, frame.right_stamp) * 1e3;
+  feed.skew_sum_ms += skew_ms;
+  if (std::abs(skew_ms) > std::abs(feed.report.largest_skew_ms)) feed.report.largest_skew_ms = skew_ms;
+  return frame;
+}
+
+std::string CameraStream::why_missing(const Feed& feed, std::size_t side) const {
+  const std::string& camera = side == 0 ? feed.pair.left : feed.pair.right;
+  const ImageSource& source = *feed.sources[std::min(side, feed.sources.size() - 1)];
+  return source.is_lost() ? fmt::format("camera {} does not answer", camera)
+                          : fmt::format("camera {} delivered no image at the time of the other one", camera);
+}
+
+// Why a frame cannot be delivered; none: it can.
+std::optional<MissingFrame> CameraStream::fault_of(Feed& feed, const ImagePair& pair, const StereoFrame& frame) const {
+  MissingFrame missing;
+  constexpr FrameFault kMissing[] = {FrameFault::left_missing, FrameFault::right_missing};
+  const std::string* const names[] = {&feed.pair.left, &feed.pair.right};
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!pair.images[side]) {
+      ++(side == 0 ? feed.report.right_alone : feed.report.left_alone);
+      missing.fault = kMissing[side];
+      missing.message = why_missing(feed, side);
+      return missing;
+    }
+  }
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (!pair.images[side]->image.image.empty()) continue;
+    ++feed.report.incomplete;
+    missing.fault = kMissing[side];
+    missing.message = fmt::format("the image of camera {} is not complete: packets were lost", *names[side]);
+    return missing;
+  }
+  for (std::size_t side = 0; side < 2; ++side) {
+    const FrameImage& image = pair.images[side]->image.image;
+    const ImageSize size = info_.rig.find_camera(*names[side])->size;
+    if (image.size() == size) continue;
+    ++feed.report.wrong_size;
+    missing.fault = FrameFault::wrong_size;
+    missing.message = fmt::format("camera {} delivers images of {} × {}, the rig has {} × {}", *names[side],
+                                  image.width(), image.height(), size.width, size.height);
+    return missing;
+  }
+  if (feed.last_stamp && frame.left_stamp <= *feed.last_stamp) {
+    ++feed.report.stamps_reversed;
+    missing.fault = FrameFault::stamp_reversed;
+    missing.message = fmt::format("its time is {:.6f} s before that of the frame before it",
+                                  seconds_between(frame.left_stamp, *feed.last_stamp));
+    return missing;
+  }
+  feed.last_stamp = frame.left_stamp;
+  return std::nullopt;
+}
+
+Result<CameraStream::Feed*> CameraStream::feed_of(const std::string& pair) {
+  for (const auto& feed : feeds_) {
+    if (feed->pair.name == pair) return feed.get();
+  }
+  return failure(ErrorCode::configuration, "has no cameras that run now", pair);
+}
+
+CameraControl* CameraStream::control() {
+  const bool any = std::any_of(feeds_.begin(), feeds_.end(), [](const auto& feed) {
+    return std::any_of(feed->sources.begin(), feed->sources.end(),
+                       [](const auto& source) { return source->has_controls(); });
+  });
+  return any ? this : nullptr;
+}
+
+Status CameraStream::trigger(const std::string& pair) {
+  const auto feed = feed_of(pair);
+  if (!feed) return failure(feed);
+  Status all;
+  for (const auto& source : (*feed)->sources) {
+    if (Status triggered = source->trigger(); !triggered) all = triggered;
+  }
+  return all;
+}
+
+Status CameraStream::set_exposure(const std::string& pair, const ExposureSettings& settings) {
+  const auto feed = feed_of(pair);
+  if (!feed) return failure(feed);
+  Status all;
+  for (const auto& source : (*feed)->sources) {
+    if (Status set = source->set_exposure(settings); !set) all = set;
+  }
+  return all;
+}
+
+std::vector<CameraPairReport> CameraStream::camera_reports() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<CameraPairReport> reports;
+  for (const auto& feed : feeds_) {
+    CameraPairReport report = feed->report;
+    if (report.pairs > 0) report.mean_skew_ms = feed->skew_sum_ms / static_cast<double>(report.pairs);
+    for (const auto& source : feed->sources) {
+      const SourceCounts counts = source->counts();
+      for (const Camera* camera : source->request().cameras) {
+        report.cameras.push_back({camera->name, counts.images, counts.incomplete, counts.not_received,
+                                  counts.duplicates, counts.reversed, counts.wrong_stamps, counts.triggers,
+                                  counts.unanswered, counts.untriggered, counts.losses, counts.clock_sigma_s * 1e3, (counts.clock_rate - 1) * 1e6});
+      }
+    }
+    reports.push_back(std::move(report));
+  }
+  return reports;
+}
+
+}  // namespace spartan::internal

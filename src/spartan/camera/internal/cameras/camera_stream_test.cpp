@@ -1,0 +1,261 @@
+#include "spartan/camera/internal/cameras/camera_stream.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <queue>
+#include <string>
+#include <thread>
+
+#include "spartan/testing/temporary_folder.h"
+#include "spartan/testing/text_checks.h"
+
+namespace spartan::internal {
+namespace {
+
+using std::chrono::milliseconds;
+using ::testing::HasSubstr;
+using Clock = std::chrono::steady_clock;
+
+// What a scripted camera does next, given by the test.
+struct Script {
+  std::mutex mutex;
+  std::queue<DeviceRead> reads;
+  std::atomic<int> opened = 0, triggers = 0, exposures = 0;
+  std::atomic<bool> openable = true;
+
+  void add(DeviceRead read) {
+    const std::lock_guard lock(mutex);
+    reads.push(std::move(read));
+  }
+};
+
+class ScriptedCamera : public CameraDevice {
+ public:
+  explicit ScriptedCamera(Script& script) : script_(script) { ++script.opened; }
+  DeviceRead read(std::chrono::nanoseconds) override {
+    {
+      const std::lock_guard lock(script_.mutex);
+      if (!script_.reads.empty()) {
+        DeviceRead read = std::move(script_.reads.front());
+        script_.reads.pop();
+        return read;
+      }
+    }
+    std::this_thread::sleep_for(milliseconds(1));
+    return {DeviceRead::State::none_yet, {}, {}};
+  }
+  bool has_controls() const override { return true; }
+  Status trigger() override {
+    ++script_.triggers;
+    return {};
+  }
+  Status set_exposure(const ExposureSettings& settings) override {
+    EXPECT_EQ(settings.exposure_us, 2000);
+    ++script_.exposures;
+    return {};
+  }
+
+ private:
+  Script& script_;
+};
+
+Rig two_cameras(const std::string& trigger = CameraDriver::kFree, double rate_hz = 0) {
+  Rig rig;
+  for (const char* name : {"left", "right"}) {
+    Camera camera;
+    camera.name = name;
+    camera.size = {8, 6};
+    camera.driver = CameraDriver{};
+    camera.driver->source = std::string("test:") + name;
+    camera.driver->trigger = trigger;
+    camera.driver->rate_hz = rate_hz;
+    rig.cameras.push_back(camera);
+  }
+  rig.pairs = {{"front", "left", "right", 0, true}};
+  return rig;
+}
+
+DeviceRead image_read(std::int64_t frame_id, int value, ImageSize size = {8, 6}) {
+  DeviceRead read{DeviceRead::State::image, {}, {}};
+  Image<std::uint8_t> pixels(size.width, size.height, static_cast<std::uint8_t>(value));
+  read.image.image = FrameImage::own(std::move(pixels), PixelFormat());
+  read.image.frame_id = frame_id;
+  read.image.began = read.image.complete = Clock::now();
+  read.image.camera_ns = read.image.began.time_since_epoch() / std::chrono::nanoseconds(1);
+  return read;
+}
+
+class CameraStreamTest : public ::testing::Test {
+ protected:
+  void deliver(std::int64_t id) {
+    scripts["left"].add(image_read(id, 1));
+    scripts["right"].add(image_read(id, 2));
+  }
+
+  Result<std::unique_ptr<CameraStream>> open(const Rig& rig) {
+    StreamInfo info;
+    info.rig = rig;
+    info.path = "test:";
+    CameraStreamOptions options;
+    options.pair_wait = milliseconds(100);
+    options.first_wait = milliseconds(500);
+    return CameraStream::create(
+        info,
+        [this](const DeviceRequest& request) -> Result<std::unique_ptr<CameraDevice>> {
+          Script& script = scripts[request.cameras.front()->name];
+          if (!script.openable) return failure(ErrorCode::read_error, "is not there", request.names());
+          return std::make_unique<ScriptedCamera>(script);
+        },
+        options, Log());
+  }
+
+  // The next sample, waited for.
+  static Sample next(CameraStream& stream) {
+    auto read = stream.read(std::chrono::seconds(20));
+    EXPECT_TRUE(read && read->state == StreamRead::State::sample);
+    return read && read->sample ? *read->sample : Sample(ImuSample());
+  }
+
+  std::map<std::string, Script> scripts;
+};
+
+TEST_F(CameraStreamTest, PairsOfImagesBecomeFrames) {
+  deliver(1);
+  auto stream = open(two_cameras());
+  ASSERT_TRUE(stream) << stream.error().message();
+  EXPECT_EQ((*stream)->previews("front"), 1u);
+  EXPECT_EQ((*stream)->preview("front", 0)->left.as<std::uint8_t>()(0, 0), 1);
+  EXPECT_EQ((*stream)->preview("front", 0)->right.as<std::uint8_t>()(0, 0), 2);
+  EXPECT_FALSE((*stream)->preview("front", 1));
+  EXPECT_EQ((*stream)->read(milliseconds(1))->state, StreamRead::State::none_yet);
+  std::optional<Stamp> before;
+  for (int i = 2; i < 12; ++i) {
+    deliver(i);
+    std::this_thread::sleep_for(milliseconds(2));
+    const Sample sample = next(**stream);
+    const auto& frame = std::get<StereoFrame>(sample);
+    EXPECT_EQ(frame.pair, "front");
+    if (before) {
+      EXPECT_GT(frame.left_stamp, *before);
+    }
+    before = frame.left_stamp;
+  }
+  const auto reports = (*stream)->camera_reports();
+  ASSERT_EQ(reports.size(), 1u);
+  EXPECT_EQ(reports[0].pairs, 10);
+  EXPECT_EQ(reports[0].left_alone + reports[0].right_alone + reports[0].incomplete, 0);
+  EXPECT_EQ(reports[0].cameras[0].camera, "left");
+  EXPECT_EQ(reports[0].cameras[1].images, 11) << "the preview is one of them";
+  scripts["left"].add({DeviceRead::State::end, {}, {}});
+  scripts["right"].add({DeviceRead::State::end, {}, {}});
+  EXPECT_EQ((*stream)->read(std::chrono::seconds(20))->state, StreamRead::State::end);
+}
+
+TEST_F(CameraStreamTest, WhatCannotBeDeliveredIsNamedAndCounted) {
+  deliver(1);
+  auto stream = open(two_cameras());
+  ASSERT_TRUE(stream) << stream.error().message();
+  static_cast<void>((*stream)->read(milliseconds(1)));
+  scripts["left"].add(image_read(2, 1));
+  const Sample alone = next(**stream);
+  EXPECT_EQ(std::get<MissingFrame>(alone).fault, FrameFault::right_missing);
+  EXPECT_THAT(std::get<MissingFrame>(alone).message, HasSubstr("camera right"));
+  EXPECT_FALSE(std::get<MissingFrame>(alone).partial->left.empty());
+
+  DeviceRead torn = image_read(3, 1);
+  torn.image.image = {};
+  scripts["left"].add(torn);
+  scripts["right"].add(image_read(3, 2));
+  const Sample incomplete = next(**stream);
+  EXPECT_EQ(std::get<MissingFrame>(incomplete).fault, FrameFault::left_missing);
+  EXPECT_THAT(std::get<MissingFrame>(incomplete).message, HasSubstr("not complete"));
+
+  scripts["left"].add(image_read(4, 1, {4, 4}));
+  scripts["right"].add(image_read(4, 2));
+  EXPECT_EQ(std::get<MissingFrame>(next(**stream)).fault, FrameFault::wrong_size);
+
+  deliver(5);
+  EXPECT_TRUE(std::holds_alternative<StereoFrame>(next(**stream)));
+  // Again, one of before, and one after two that were left out.
+  scripts["left"].add(image_read(5, 1));
+  scripts["left"].add(image_read(4, 1));
+  deliver(8);
+  EXPECT_TRUE(std::holds_alternative<StereoFrame>(next(**stream)));
+  const CameraPairReport report = (*stream)->camera_reports()[0];
+  EXPECT_EQ(report.pairs, 2);
+  EXPECT_EQ(report.left_alone, 1);
+  EXPECT_EQ(report.incomplete, 1);
+  EXPECT_EQ(report.wrong_size, 1);
+  EXPECT_EQ(report.cameras[0].duplicates, 1);
+  EXPECT_EQ(report.cameras[0].reversed, 1);
+  EXPECT_EQ(report.cameras[0].not_received, 2);
+  EXPECT_EQ(report.cameras[0].incomplete, 1);
+  EXPECT_EQ(report.cameras[1].not_received, 3) << "the one without a partner, and two";
+  EXPECT_THAT(describe(report), HasSubstr("1 left images alone"));
+}
+
+TEST_F(CameraStreamTest, ACameraThatIsLostIsOpenedAgainWithItsExposure) {
+  deliver(1);
+  auto stream = open(two_cameras());
+  ASSERT_TRUE(stream) << stream.error().message();
+  ASSERT_TRUE((*stream)->set_exposure("front", {2000, 1.5}));
+  static_cast<void>((*stream)->read(milliseconds(1)));
+  scripts["right"].openable = false;
+  scripts["right"].add({DeviceRead::State::lost, {}, "unplugged"});
+  while (scripts["right"].opened == 1 && (*stream)->camera_reports()[0].cameras[1].losses == 0) {
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  scripts["left"].add(image_read(2, 1));
+  const Sample alone = next(**stream);
+  EXPECT_THAT(std::get<MissingFrame>(alone).message, HasSubstr("camera right does not answer"));
+  EXPECT_FALSE((*stream)->trigger("front")) << "one of them does not answer";
+
+  scripts["right"].openable = true;
+  while (scripts["right"].opened < 2) std::this_thread::sleep_for(milliseconds(1));
+  deliver(3);
+  EXPECT_TRUE(std::holds_alternative<StereoFrame>(next(**stream)));
+  while (scripts["right"].exposures < 2) std::this_thread::sleep_for(milliseconds(1));
+  EXPECT_EQ(scripts["left"].exposures, 1) << "the other one is not set again";
+  EXPECT_EQ((*stream)->camera_reports()[0].cameras[1].losses, 1);
+}
+
+TEST_F(CameraStreamTest, TriggersAtARateAndAccountsForEach) {
+  const Rig rig = two_cameras(CameraDriver::kSoftware, 50);
+  deliver(1);
+  auto stream = open(rig);
+  ASSERT_TRUE(stream) << stream.error().message();
+  while (scripts["left"].triggers < 5 || scripts["right"].triggers < 5) {
+    static_cast<void>((*stream)->read(milliseconds(5)));
+  }
+  EXPECT_TRUE((*stream)->trigger("front"));
+  EXPECT_EQ((*stream)->trigger("back").error().code, ErrorCode::configuration);
+  // None of them is answered, which is known a second later.
+  while ((*stream)->camera_reports()[0].cameras[0].unanswered == 0) static_cast<void>((*stream)->read(milliseconds(5)));
+  EXPECT_GE((*stream)->camera_reports()[0].cameras[0].triggers, 6);
+}
+
+TEST_F(CameraStreamTest, OpeningFailsWithTheReason) {
+  scripts["left"].add(image_read(1, 1));
+  const auto half = open(two_cameras());
+  ASSERT_FALSE(half);
+  EXPECT_EQ(half.error().code, ErrorCode::read_error);
+  EXPECT_THAT(half.error().message(), HasSubstr("1 images by left, 0 by right"));
+
+  scripts["right"].openable = false;
+  EXPECT_THAT(open(two_cameras()).error().message(), HasSubstr("is not there"));
+
+  Rig rig = two_cameras();
+  rig.cameras[1].driver.reset();
+  EXPECT_THAT(testing::error_message(open(rig)), HasSubstr("cameras.right: has no driver"));
+  rig.cameras[0].driver.reset();
+  EXPECT_EQ(open(rig).error().code, ErrorCode::configuration);
+}
+
+}  // namespace
+}  // namespace spartan::internal

@@ -1,0 +1,288 @@
+#include "spartan/camera/internal/cameras/image_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace spartan::internal {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// A frame id that is lower by more, or higher by more, is that of a camera which counts from a new start.
+constexpr std::int64_t kMostLeftOut = 1000;
+
+// Of a stamp that follows from the arrival alone.
+constexpr double kArrivalSigma_s = 5e-3;
+
+std::int64_t nanoseconds(double seconds) {
+  return static_cast<std::int64_t>(std::llround(seconds * 1e9));
+}
+
+}  // namespace
+
+std::string DeviceRequest::names() const {
+  std::string text;
+  for (const Camera* camera : cameras) text += (text.empty() ? "" : ", ") + camera->name;
+  return text;
+}
+
+HostClock::HostClock()
+    : steady_(Clock::now()),
+      epoch_ns_(std::chrono::duration_cast<std::chrono::nanoseconds>(
+                    std::chrono::system_clock::now().time_since_epoch())
+                    .count()) {}
+
+Stamp HostClock::stamp_of(Time time) const {
+  return Stamp{epoch_ns_ + std::chrono::duration_cast<std::chrono::nanoseconds>(time - steady_).count()};
+}
+
+ImageSource::ImageSource(DeviceRequest request, OpenDevice open, const HostClock& clock, const Log& log)
+    : request_(std::move(request)), open_(std::move(open)), host_(clock), log_(log) {}
+
+Result<std::unique_ptr<ImageSource>> ImageSource::create(DeviceRequest request, OpenDevice open, const HostClock& clock,
+                                                         const Log& log) {
+  std::unique_ptr<ImageSource> source(new ImageSource(std::move(request), std::move(open), clock, log));
+  auto device = source->open_(source->request_);
+  if (!device) return failure(device);
+  source->device_ = std::move(*device);
+  source->has_controls_ = source->device_->has_controls();
+  return source;
+}
+
+ImageSource::~ImageSource() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  stop_changed_.notify_all();
+  if (command_thread_.joinable()) command_thread_.join();
+  if (thread_.joinable()) thread_.join();
+}
+
+void ImageSource::start(Clock::time_point first_trigger, Deliver deliver, std::function<void()> changed) {
+  deliver_ = std::move(deliver);
+  changed_ = std::move(changed);
+  thread_ = std::thread([this] { run(); });
+  if (has_controls_) command_thread_ = std::thread([this, first_trigger] { run_commands(first_trigger); });
+}
+
+bool ImageSource::wait(Clock::time_point until) {
+  std::unique_lock lock(mutex_);
+  stop_changed_.wait_until(lock, until, [this] { return stop_; });
+  return !stop_;
+}
+
+std::shared_ptr<CameraDevice> ImageSource::device() const {
+  const std::lock_guard lock(mutex_);
+  return device_;
+}
+
+bool ImageSource::is_lost() const {
+  return device() == nullptr;
+}
+
+SourceCounts ImageSource::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+Status ImageSource::command(const std::function<void()>& note) {
+  const std::lock_guard lock(mutex_);
+  if (!has_controls_) return failure(ErrorCode::configuration, "cannot be controlled", request_.names());
+  note();
+  stop_changed_.notify_all();
+  return device_ ? Status() : failure(ErrorCode::read_error, "does not answer", request_.names());
+}
+
+Status ImageSource::trigger() {
+  return command([this] { pending_triggers_ += device_ ? 1 : 0; });
+}
+
+Status ImageSource::set_exposure(const ExposureSettings& settings) {
+  return command([&] { exposure_ = pending_exposure_ = settings; });
+}
+
+// A camera that no longer answers holds up its commands for seconds, so they have a thread.
+void ImageSource::run_commands(Clock::time_point first_trigger) {
+  const CameraDriver& driver = request_.driver();
+  const bool by_rate = driver.trigger == CameraDriver::kSoftware && driver.rate_hz > 0;
+  const auto period = std::chrono::nanoseconds(by_rate ? nanoseconds(1 / driver.rate_hz) : 0);
+  Clock::time_point next = by_rate ? first_trigger : Clock::time_point::max();
+  for (;;) {
+    std::optional<ExposureSettings> exposure;
+    int triggers = 0;
+    {
+      std::unique_lock lock(mutex_);
+      const auto wanted = [this] { return stop_ || pending_exposure_ || pending_triggers_ > 0; };
+      if (by_rate) stop_changed_.wait_until(lock, next, wanted);
+      else stop_changed_.wait(lock, wanted);
+      if (stop_) return;
+      std::swap(exposure, pending_exposure_);
+      std::swap(triggers, pending_triggers_);
+    }
+    if (by_rate && Clock::now() >= next) {
+      ++triggers;
+      // After a pause of the process: no burst of triggers for the times that have passed.
+      while (next <= Clock::now()) next += period;
+    }
+    const auto device = this->device();
+    if (!device) continue;
+    if (exposure) report(device->set_exposure(*exposure));
+    for (; triggers > 0; --triggers) report(send_trigger(*device));
+  }
+}
+
+// Once for errors in a row.
+void ImageSource::report(const Status& status) {
+  if (!status && !refused_) log_.warning(status.error().message());
+  refused_ = !status;
+}
+
+Status ImageSource::send_trigger(CameraDevice& device) {
+  const Stamp now = host_.now();
+  {
+    // Before the trigger, so that an image which comes at once finds it.
+    const std::lock_guard lock(mutex_);
+    open_triggers_.push_back(now);
+    ++counts_.triggers;
+  }
+  const Status triggered = device.trigger();
+  if (triggered) return {};
+  const std::lock_guard lock(mutex_);
+  const auto open = std::find(open_triggers_.begin(), open_triggers_.end(), now);
+  if (open != open_triggers_.end()) {
+    open_triggers_.erase(open);
+    ++counts_.unanswered;
+  }
+  return triggered;
+}
+
+// The image belongs to the trigger that is nearest to its stamp, of those before its arrival; earlier ones have none.
+void ImageSource::answer_trigger(Stamp stamp, Stamp arrival) {
+  const auto end = std::find_if(open_triggers_.begin(), open_triggers_.end(), [&](Stamp t) { return t > arrival; });
+  const auto answered = std::min_element(open_triggers_.begin(), end, [&](Stamp a, Stamp b) {
+    return std::abs(seconds_between(stamp, a)) < std::abs(seconds_between(stamp, b));
+  });
+  if (answered == end) {
+    counts_.untriggered += request_.driver().trigger == CameraDriver::kSoftware;
+    return;
+  }
+  counts_.unanswered += answered - open_triggers_.begin();
+  open_triggers_.erase(open_triggers_.begin(), answered + 1);
+}
+
+void ImageSource::give_up_triggers() {
+  const std::lock_guard lock(mutex_);
+  while (!open_triggers_.empty() && seconds_between(open_triggers_.front(), host_.now()) > kAnswer_s) {
+    open_triggers_.pop_front();
+    ++counts_.unanswered;
+  }
+}
+
+void ImageSource::run() {
+  while (wait(Clock::now())) {
+    give_up_triggers();
+    const auto device = this->device();
+    if (!device) {
+      reopen();
+      continue;
+    }
+    DeviceRead read = device->read(kPoll);
+    if (read.state == DeviceRead::State::image) {
+      deliver(std::move(read.image));
+    } else if (read.state == DeviceRead::State::end) {
+      break;
+    } else if (read.state == DeviceRead::State::lost) {
+      log_.error(fmt::format("camera {} ({}): {}; trying again", request_.names(), request_.driver().source,
+                             read.reason));
+      const std::lock_guard lock(mutex_);
+      device_ = nullptr;
+      ++counts_.losses;
+    }
+  }
+  ended_ = true;
+  changed_();
+}
+
+void ImageSource::reopen() {
+  if (!wait(Clock::now() + kRetry)) return;
+  auto device = open_(request_);
+  if (!device) {
+    log_.debug(device.error().message());
+    return;
+  }
+  log_.warning(fmt::format("camera {} ({}) answers again", request_.names(), request_.driver().source));
+  last_ = {};
+  clocks_ = {};
+  const std::lock_guard lock(mutex_);
+  device_ = std::move(*device);
+  pending_exposure_ = exposure_;
+  stop_changed_.notify_all();
+}
+
+void ImageSource::deliver(CameraImage image) {
+  const int side = image.side == 0 ? 0 : 1;
+  const bool fresh = is_new(image);
+  StampedImage stamped = this->stamped(std::move(image));
+  {
+    const std::lock_guard lock(mutex_);
+    if (fresh) ++(stamped.image.image.empty() ? counts_.incomplete : counts_.images);
+    if (fresh) answer_trigger(stamped.stamp, host_.stamp_of(stamped.image.complete));
+    if (!stamped.trusted) ++counts_.wrong_stamps;
+    counts_.clock_sigma_s = stamped.sigma_s;
+    counts_.clock_rate = clocks_[0].rate();
+  }
+  if (fresh) deliver_(side, std::move(stamped));
+}
+
+// Counts what the camera has left out; false of an image that came before.
+bool ImageSource::is_new(const CameraImage& image) {
+  Last& last = last_[image.side == 0 ? 0 : 1];
+  const std::lock_guard lock(mutex_);
+  if (image.frame_id >= 0 && last.frame_id >= 0) {
+    const std::int64_t step = image.frame_id - last.frame_id;
+    if (step == 0) {
+      ++counts_.duplicates;
+      return false;
+    }
+    if (step < 0 && step > -kMostLeftOut) {
+      ++counts_.reversed;
+      return false;
+    }
+    if (step > 1 && step <= kMostLeftOut) counts_.not_received += step - 1;
+  } else if (image.camera_ns >= 0 && image.camera_ns == last.camera_ns) {
+    ++counts_.duplicates;
+    return false;
+  }
+  last = {image.frame_id, image.camera_ns};
+  return true;
+}
+
+// The middle of the exposure: of a stamp at its begin, half an exposure later; an image is noticed after its end.
+StampedImage ImageSource::stamped(CameraImage image) {
+  const CameraDriver& driver = request_.driver();
+  const double exposure_s = image.exposure_us * 1e-6;
+  const double after_middle_s = driver.stamp_at == StampAt::exposure_start ? -exposure_s / 2
+                                : driver.stamp_at == StampAt::exposure_end ? exposure_s / 2
+                                                                           : 0;
+  const Stamp end{host_.stamp_of(image.began).ns - nanoseconds(driver.latency_ms * 1e-3)};
+  StampedImage stamped;
+  if (image.camera_ns >= 0) {
+    // What the clock maps is the moment of the stamp, which is `after_middle_s − exposure_s / 2` before the end.
+    const Stamp moment{end.ns + nanoseconds(after_middle_s - exposure_s / 2)};
+    const MappedStamp mapped = clocks_[image.side == 0 ? 0 : 1].add(image.camera_ns, moment);
+    stamped.stamp = Stamp{mapped.host.ns - nanoseconds(after_middle_s)};
+    stamped.trusted = mapped.trusted;
+    stamped.sigma_s = mapped.sigma_s;
+  } else {
+    stamped.stamp = Stamp{end.ns - nanoseconds(exposure_s / 2)};
+    stamped.sigma_s = kArrivalSigma_s;
+  }
+  stamped.image = std::move(image);
+  return stamped;
+}
+
+}  // namespace spartan::internal

@@ -1,0 +1,141 @@
+// One camera device of a live stream on threads of its own: its images on the clock of the host.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "spartan/camera/internal/cameras/camera_clock.h"
+#include "spartan/camera/internal/cameras/camera_device.h"
+#include "spartan/camera/internal/cameras/image_pairing.h"
+#include "spartan/core/log.h"
+#include "spartan/core/result.h"
+#include "spartan/rig/rig.h"
+
+namespace spartan::internal {
+
+/// The device of one camera, or of both of a pair.
+struct DeviceRequest {
+  std::vector<const Camera*> cameras;  ///< left and right, or one of them; their drivers name the same source
+  const CameraDriver& driver() const { return *cameras.front()->driver; }
+  std::string names() const;
+};
+
+using OpenDevice = std::function<Result<std::unique_ptr<CameraDevice>>(const DeviceRequest&)>;
+
+/// Host time: nanoseconds since the epoch when the clock was made, and since then those of the steady clock, so that a
+/// correction of the system's time does not reach the stamps.
+class HostClock {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  HostClock();
+  Stamp stamp_of(Time time) const;
+  Stamp now() const { return stamp_of(std::chrono::steady_clock::now()); }
+
+ private:
+  Time steady_;
+  std::int64_t epoch_ns_;
+};
+
+/// What a device has delivered so far.
+struct SourceCounts {
+  std::int64_t images = 0;        ///< those that are complete
+  std::int64_t incomplete = 0;    ///< packets of them are missing
+  std::int64_t not_received = 0;  ///< left out in the count of the camera
+  std::int64_t duplicates = 0, reversed = 0;  ///< discarded: the same image again; an earlier one
+  std::int64_t wrong_stamps = 0;
+  std::int64_t triggers = 0;    ///< sent
+  std::int64_t unanswered = 0;  ///< triggers without an image
+  std::int64_t untriggered = 0;  ///< images without a trigger, or later than kAnswer_s, of a camera that is triggered
+  std::int64_t losses = 0;    ///< how often the camera no longer answered
+  double clock_sigma_s = 0, clock_rate = 1;
+};
+
+/// Opens a device, reads it on a thread, and opens it again each kRetry after it was lost. A second thread sends it its
+/// exposures and triggers; the times of triggers at a rate are the same for all devices with the same start.
+class ImageSource {
+ public:
+  /// An image of the camera `side` of the request. Called by the thread of the source.
+  using Deliver = std::function<void(int side, StampedImage image)>;
+
+  /// Borrows the clock. Errors: those of `open`.
+  static Result<std::unique_ptr<ImageSource>> create(DeviceRequest request, OpenDevice open, const HostClock& clock,
+                                                     const Log& log);
+  ~ImageSource();
+  ImageSource(const ImageSource&) = delete;
+  ImageSource& operator=(const ImageSource&) = delete;
+
+  /// Once. `changed` is called where the source has ended.
+  void start(std::chrono::steady_clock::time_point first_trigger, Deliver deliver, std::function<void()> changed);
+  /// No image will follow.
+  bool ended() const { return ended_; }
+  /// The camera does not answer now.
+  bool is_lost() const;
+  bool has_controls() const { return has_controls_; }
+  /// They return at once; what the camera refuses is logged. Codes: `read_error` (the camera does not answer now; an
+  /// exposure is set when it does), `configuration` (it cannot be controlled).
+  Status trigger();
+  Status set_exposure(const ExposureSettings& settings);
+  SourceCounts counts() const;
+  const DeviceRequest& request() const { return request_; }
+
+  static constexpr std::chrono::milliseconds kRetry{1000}, kPoll{50};
+  static constexpr double kAnswer_s = 1;  ///< within which an image follows its trigger
+
+ private:
+  ImageSource(DeviceRequest request, OpenDevice open, const HostClock& clock, const Log& log);
+  void run();
+  void reopen();
+  Status command(const std::function<void()>& note);
+  void run_commands(std::chrono::steady_clock::time_point first_trigger);
+  Status send_trigger(CameraDevice& device);
+  void report(const Status& status);
+  void deliver(CameraImage image);
+  bool is_new(const CameraImage& image);
+  void answer_trigger(Stamp stamp, Stamp arrival);
+  void give_up_triggers();
+  StampedImage stamped(CameraImage image);
+  std::shared_ptr<CameraDevice> device() const;
+  bool wait(std::chrono::steady_clock::time_point until);
+
+  DeviceRequest request_;
+  OpenDevice open_;
+  const HostClock& host_;
+  Log log_;
+  bool has_controls_ = false;
+  Deliver deliver_;
+  std::function<void()> changed_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable stop_changed_;
+  std::shared_ptr<CameraDevice> device_;  // null: lost
+  std::optional<ExposureSettings> exposure_, pending_exposure_;
+  int pending_triggers_ = 0;
+  SourceCounts counts_;
+  std::deque<Stamp> open_triggers_;  // not answered yet
+  bool stop_ = false;
+  std::atomic<bool> ended_ = false;
+
+  // Of the thread, by side.
+  struct Last {
+    std::int64_t frame_id = -1, camera_ns = -1;
+  };
+  std::array<Last, 2> last_;
+  std::array<CameraClock, 2> clocks_;
+
+  bool refused_ = false;  // of the thread of commands
+
+  std::thread thread_, command_thread_;
+};
+
+}  // namespace spartan::internal

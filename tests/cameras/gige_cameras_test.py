@@ -1,0 +1,189 @@
+#!/usr/bin/env python3
+"""Live runs with two GigE Vision cameras: Aravis' own without a camera, which show a rendered drive.
+
+    gige_cameras_test.py SPARTAN FAKE_CAMERA SMALL_RUNS
+    gige_cameras_test.py SPARTAN FAKE_CAMERA SMALL_RUNS --case lost_packets --seconds 600 --recording DRIVE
+
+The control port of GigE Vision is fixed, so each camera has an address of its own on a loopback network of this process
+(a network namespace, which Debian lets every user have). Without namespaces the test is skipped (77).
+"""
+import argparse
+import fcntl
+import json
+import os
+import pathlib
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+
+SKIPPED = 77
+RATE_HZ = 10
+START_S = 4  # to the first trigger, at most
+
+
+def make_network():
+    """The loopback device with two addresses: `lo` and `lo:1`."""
+    SIOCSIFADDR, SIOCSIFFLAGS, IFF_UP_RUNNING = 0x8916, 0x8914, 0x41
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
+        def address(name, text):
+            fcntl.ioctl(control, SIOCSIFADDR, struct.pack("16sHH4s8x", name, socket.AF_INET, 0, socket.inet_aton(text)))
+        fcntl.ioctl(control, SIOCSIFFLAGS, struct.pack("16sH14x", b"lo", IFF_UP_RUNNING))
+        address(b"lo:1", "127.0.0.2")
+
+
+class Cameras:
+    """The fake cameras `left` and `right`."""
+
+    def __init__(self, program, recording, lost):
+        self.program, self.lost = program, lost
+        self.folders = {"left": recording / "image_0", "right": recording / "image_1"}
+        self.epoch = time.monotonic_ns()
+        self.processes = {}
+
+    def start(self, side):
+        interface = {"left": "lo", "right": "lo:1"}[side]
+        command = [self.program, interface, side, str(self.lost), str(self.folders[side]), str(self.epoch), str(RATE_HZ)]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        assert process.stdout.readline().strip() == "ready", f"camera {side} does not start"
+        self.processes[side] = process
+
+    def stop(self, side):
+        process = self.processes.pop(side, None)
+        if process is not None:
+            process.kill()
+            process.wait()
+
+    def __enter__(self):
+        for side in self.folders:
+            self.start(side)
+        return self
+
+    def __exit__(self, *_):
+        for side in self.folders:
+            self.stop(side)
+
+
+def rig_with_drivers(spartan, recording, folder):
+    """The rig of the recording with drivers, triggered by software at RATE_HZ."""
+    rig = folder / "rig.yaml"
+    subprocess.run([spartan, "rig", "convert", str(recording), str(rig), "--to", "rig.yaml", "--quiet"], check=True)
+    lines, ids, in_cameras = [], iter(["left", "right"]), False
+    for line in rig.read_text().splitlines():
+        in_cameras = line == "cameras:" or (in_cameras and line.startswith(" "))
+        lines.append(line)
+        if in_cameras and line.strip().startswith("quaternion_xyzw:"):
+            lines += ["    driver:", f"      source: aravis:Aravis-{next(ids)}", "      trigger: software",
+                      f"      rate_hz: {RATE_HZ}"]
+    rig.write_text("\n".join(lines) + "\n")
+    return rig
+
+
+def live_run(arguments, lost=0.0, gone_s=0.0, record=False):
+    """The summary of a live run that was stopped after a while, and what it said."""
+    with tempfile.TemporaryDirectory() as name, Cameras(arguments.fake, arguments.recording, lost) as cameras:
+        folder = pathlib.Path(name)
+        rig = rig_with_drivers(arguments.spartan, arguments.recording, folder)
+        out, log = folder / "run", folder / "log"
+        command = [arguments.spartan, "run", f"live:{rig}", "-o", str(out), "--odometry-only", "--threads", "1"]
+        command += [] if record else ["--no-recording"]
+        with open(log, "w", encoding="utf-8") as text:
+            run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=text)
+            if gone_s > 0:
+                time.sleep(arguments.seconds / 2)
+                cameras.stop("right")
+                time.sleep(gone_s)
+                cameras.start("right")
+                time.sleep(arguments.seconds / 2)
+            else:
+                time.sleep(arguments.seconds)
+            run.send_signal(signal.SIGINT)
+            code = run.wait(timeout=60)
+        said = log.read_text()
+        assert (out / "summary.json").exists(), f"no summary, exit code {code}:\n{said}"
+        return json.loads((out / "summary.json").read_text()), said
+
+
+def check_accounts(summary, seconds):
+    """Every trigger is a pair, or is accounted for."""
+    pair = summary["live"]["cameras"][0]
+    for camera in pair["cameras"]:
+        print(json.dumps(camera))
+        assert camera["triggers"] > 0.9 * RATE_HZ * (seconds - START_S), "too few triggers"
+        open_triggers = (camera["triggers"] + camera["untriggered"] - camera["images"] - camera["incomplete"]
+                         - camera["unanswered"])
+        assert camera["untriggered"] <= 2, "images that no trigger asked for"
+        assert 0 <= open_triggers <= RATE_HZ, f"{open_triggers} triggers of {camera['camera']} are not accounted for"
+    print(json.dumps({key: value for key, value in pair.items() if key != "cameras"}))
+    print(json.dumps({"frames": summary["frames"], "latency_ms": summary["live"]["latency_ms"],
+                      "dropped": summary["live"]["dropped"]}))
+    return pair
+
+
+def case_plain(arguments):
+    summary, said = live_run(arguments)
+    pair = check_accounts(summary, arguments.seconds)
+    assert pair["frames"] > 0.9 * RATE_HZ * (arguments.seconds - START_S), said
+    assert pair["incomplete"] == 0, "loopback loses no packets"
+    assert abs(pair["mean_skew_ms"]) < 5
+
+
+def case_lost_packets(arguments):
+    summary, said = live_run(arguments, lost=arguments.lost)
+    pair = check_accounts(summary, arguments.seconds)
+    not_complete = sum(camera["incomplete"] + camera["unanswered"] for camera in pair["cameras"])
+    assert not_complete > 0, "no packet was lost"
+    assert pair["frames"] > 0, said
+
+
+def case_unplugged(arguments):
+    summary, said = live_run(arguments, gone_s=arguments.gone)
+    pair = check_accounts(summary, arguments.seconds)
+    assert pair["cameras"][1]["losses"] == 1, said
+    assert "no longer answers" in said and "answers again" in said, said
+    assert pair["left_alone"] > 0, "frames with the left image only"
+    gone = RATE_HZ * (arguments.gone + 6)  # a loss is found after 3 s, and the camera is searched for each second or two
+    assert pair["frames"] > RATE_HZ * (arguments.seconds + arguments.gone - START_S) - gone, "frames before and after"
+    assert summary["live"]["latency_ms"]["p99"] < 1000, "one camera holds up the other"
+
+
+CASES = {"plain": case_plain, "lost_packets": case_lost_packets, "unplugged": case_unplugged}
+
+
+def arguments_of(command_line):
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("spartan")
+    parser.add_argument("fake")
+    parser.add_argument("small_runs", type=pathlib.Path)
+    parser.add_argument("--case", choices=CASES)
+    parser.add_argument("--seconds", type=float, default=10)
+    parser.add_argument("--lost", type=float, default=0.001, help="share of packets (default 0.001)")
+    parser.add_argument("--gone", type=float, default=5, help="seconds without the camera (default 5)")
+    parser.add_argument("--recording", type=pathlib.Path, help="in KITTI's layout (default: that of the tests)")
+    arguments = parser.parse_args(command_line)
+    arguments.recording = arguments.recording or arguments.small_runs / "drive"
+    return arguments
+
+
+def main():
+    if os.environ.get("SPARTAN_CAMERA_NETWORK") is None:
+        own = ["unshare", "--user", "--map-root-user", "--net"]
+        if subprocess.run([*own, "true"], capture_output=True, check=False).returncode != 0:
+            print("skipped: no network namespaces")
+            return SKIPPED
+        os.environ["SPARTAN_CAMERA_NETWORK"] = "own"
+        os.execvp("unshare", [*own, sys.executable, *sys.argv])
+    make_network()
+    arguments = arguments_of(sys.argv[1:])
+    for name, case in CASES.items():
+        if arguments.case in (None, name):
+            print(f"--- {name}")
+            case(arguments)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
