@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -122,7 +123,7 @@ bool set_trigger(ArvCamera* camera, const SpartanCameraSettings& settings, std::
   return !failed(error, "trigger " + trigger, why);
 }
 
-void set_manual_exposure(GenicamCamera& device) {
+void read_exposure(GenicamCamera& device) {
   ArvCamera* const camera = device.camera.get();
   if (arv_camera_is_exposure_time_available(camera, nullptr))
     device.exposure_us = arv_camera_get_exposure_time(camera, nullptr);
@@ -134,7 +135,9 @@ bool start(GenicamCamera& device, const SpartanCameraSettings& settings, std::st
   CameraError error;
   ArvCamera* const camera = device.camera.get();
   if (!set_image(camera, settings, why) || !set_trigger(camera, settings, why)) return false;
-  set_manual_exposure(device);
+  read_exposure(device);
+  // The largest packets that the network takes: fewer of them, and fewer that can be lost.
+  if (arv_camera_is_gv_device(camera)) arv_camera_gv_auto_packet_size(camera, nullptr);
   device.payload = arv_camera_get_payload(camera, error.out());
   if (failed(error, "payload", why)) return false;
   device.stream.reset(arv_camera_create_stream(camera, nullptr, nullptr, error.out()));
@@ -146,17 +149,18 @@ bool start(GenicamCamera& device, const SpartanCameraSettings& settings, std::st
   return !failed(error, "start", why);
 }
 
-// Since the first packet of an image was here.
-std::int64_t age_ns(ArvBuffer* buffer) {
+// When the first packet of an image was here.
+std::int64_t received_ns(ArvBuffer* buffer) {
   const auto received = static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer));
-  return std::max<std::int64_t>(0, g_get_real_time() * 1000 - received);
+  const std::int64_t age_ns = std::max<std::int64_t>(0, g_get_real_time() * 1000 - received);
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1) - age_ns;
 }
 
 void describe(const GenicamCamera& device, ArvBuffer* buffer, SpartanCameraImage& image) {
   image = {};
   image.frame_id = static_cast<std::int64_t>(arv_buffer_get_frame_id(buffer));
   image.camera_ns = static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer));
-  image.age_ns = age_ns(buffer);
+  image.received_ns = received_ns(buffer);
   image.exposure_us = device.exposure_us;
   image.gain = device.gain;
   if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS) {
@@ -226,8 +230,8 @@ void spartan_camera_release(void* token) {
   g_object_unref(used->stream);
 }
 
-int spartan_camera_controls(void*) {
-  return 1;
+int spartan_camera_properties(void*) {
+  return SPARTAN_CAMERA_CONTROLS;
 }
 
 int spartan_camera_trigger(void* opened, char* message, std::size_t size) {

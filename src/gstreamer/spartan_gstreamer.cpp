@@ -233,7 +233,7 @@ int deliver(CameraPipeline& opened, const QueuedSample& taken, SpartanCameraImag
   image.side = taken.side;
   image.frame_id = GST_BUFFER_OFFSET_IS_VALID(buffer) ? static_cast<std::int64_t>(GST_BUFFER_OFFSET(buffer)) : -1;
   image.camera_ns = GST_BUFFER_PTS_IS_VALID(buffer) ? static_cast<std::int64_t>(GST_BUFFER_PTS(buffer)) : -1;
-  image.age_ns = std::chrono::nanoseconds(std::chrono::steady_clock::now() - taken.received).count();
+  image.received_ns = taken.received.time_since_epoch() / std::chrono::nanoseconds(1);
   const auto sample = std::make_shared<const MappedSample>(taken.sample);
   image.pixels = sample->pixels;
   image.stride_bytes = sample->stride_bytes;
@@ -310,8 +310,8 @@ void spartan_camera_release(void* token) {
   delete static_cast<Token*>(token);
 }
 
-int spartan_camera_controls(void*) {
-  return 0;
+int spartan_camera_properties(void* handle) {
+  return static_cast<CameraPipeline*>(handle)->live ? 0 : SPARTAN_CAMERA_WAITS;
 }
 
 int spartan_camera_trigger(void*, char* message, std::size_t size) {

@@ -35,12 +35,24 @@ def make_network():
         address(b"lo:1", "127.0.0.2")
 
 
+def images_of(recording):
+    """The files of the left and the right camera, in KITTI's layout or of the odometry's pair of a simulation."""
+    if (recording / "image_0").exists():
+        return {"left": sorted((recording / "image_0").iterdir()), "right": sorted((recording / "image_1").iterdir())}
+    images = recording / "images" / "narrow"
+    return {side: sorted(images.glob(f"*_{side}.png")) for side in ("left", "right")}
+
+
 class Cameras:
     """The fake cameras `left` and `right`."""
 
-    def __init__(self, program, recording, lost):
+    def __init__(self, program, recording, lost, folder):
         self.program, self.lost = program, lost
-        self.folders = {"left": recording / "image_0", "right": recording / "image_1"}
+        self.folders = {side: folder / side for side in images_of(recording)}
+        for side, files in images_of(recording).items():
+            self.folders[side].mkdir()
+            for file in files:
+                (self.folders[side] / file.name).symlink_to(file.resolve())
         self.epoch = time.monotonic_ns()
         self.processes = {}
 
@@ -70,7 +82,9 @@ class Cameras:
 def rig_with_drivers(spartan, recording, folder):
     """The rig of the recording with drivers, triggered by software at RATE_HZ."""
     rig = folder / "rig.yaml"
-    subprocess.run([spartan, "rig", "convert", str(recording), str(rig), "--to", "rig.yaml", "--quiet"], check=True)
+    convert = [spartan, "rig", "convert", str(recording), str(rig), "--to", "rig.yaml", "--quiet"]
+    convert += [] if (recording / "image_0").exists() else ["--pair", "narrow"]
+    subprocess.run(convert, check=True, stdout=subprocess.DEVNULL)
     lines, ids, in_cameras = [], iter(["left", "right"]), False
     for line in rig.read_text().splitlines():
         in_cameras = line == "cameras:" or (in_cameras and line.startswith(" "))
@@ -84,8 +98,12 @@ def rig_with_drivers(spartan, recording, folder):
 
 def live_run(arguments, lost=0.0, gone_s=0.0, record=False):
     """The summary of a live run that was stopped after a while, and what it said."""
-    with tempfile.TemporaryDirectory() as name, Cameras(arguments.fake, arguments.recording, lost) as cameras:
-        folder = pathlib.Path(name)
+    with tempfile.TemporaryDirectory() as name:
+        return live_run_in(pathlib.Path(name), arguments, lost, gone_s, record)
+
+
+def live_run_in(folder, arguments, lost, gone_s, record):
+    with Cameras(arguments.fake, arguments.recording, lost, folder) as cameras:
         rig = rig_with_drivers(arguments.spartan, arguments.recording, folder)
         out, log = folder / "run", folder / "log"
         command = [arguments.spartan, "run", f"live:{rig}", "-o", str(out), "--odometry-only", "--threads", "1"]
@@ -162,7 +180,7 @@ def arguments_of(command_line):
     parser.add_argument("--seconds", type=float, default=10)
     parser.add_argument("--lost", type=float, default=0.001, help="share of packets (default 0.001)")
     parser.add_argument("--gone", type=float, default=5, help="seconds without the camera (default 5)")
-    parser.add_argument("--recording", type=pathlib.Path, help="in KITTI's layout (default: that of the tests)")
+    parser.add_argument("--recording", type=pathlib.Path, help="rendered drive (default: that of the tests)")
     arguments = parser.parse_args(command_line)
     arguments.recording = arguments.recording or arguments.small_runs / "drive"
     return arguments

@@ -17,7 +17,8 @@
 //                    main() was reached, and whether GDAL made or caused the allocation that failed (6 x uint64); it
 //                    is mapped, so the numbers survive a kill
 //
-// Calls between functions of the C library itself cannot be intercepted; what stdio writes is traced at fclose().
+// Calls between functions of the C library itself cannot be intercepted; what stdio writes is traced at fflush() and
+// fclose().
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
@@ -156,8 +157,13 @@ FILE* fopen(const char* path, const char* mode) {
 FILE* fopen64(const char* path, const char* mode) {
   return open_stream(next<OpenStream>("fopen64"), path, mode);
 }
+int fflush(FILE* stream) {
+  const int result = next<int (*)(FILE*)>("fflush")(stream);
+  if (plan.trace >= 0 && stream != nullptr) trace_content(stream);
+  return result;
+}
 int fclose(FILE* stream) {
-  if (plan.trace >= 0) trace_content(stream);
+  if (plan.trace >= 0) fflush(stream);
   return next<int (*)(FILE*)>("fclose")(stream);
 }
 DIR* opendir(const char* path) {

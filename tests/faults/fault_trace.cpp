@@ -82,7 +82,6 @@ bool exists(const char* path) {
 void trace_content(FILE* stream) {
   const PathOf path(::fileno(stream));
   if ((::fcntl(::fileno(stream), F_GETFL) & O_ACCMODE) == O_RDONLY || !traced(path.text)) return;
-  std::fflush(stream);
   const struct stat status = status_of(::fileno(stream));
   const auto bytes = static_cast<std::size_t>(status.st_size);
   const int file = raw_open(path.text, O_RDONLY);

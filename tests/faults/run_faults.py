@@ -15,6 +15,7 @@ import time
 import call_faults
 import disk_faults
 import environment_faults
+import live_faults
 import path_faults
 import power_loss
 import process_faults
@@ -23,7 +24,7 @@ from lab import DIFFERS, DOCUMENTED, SKIPPED, VOID, Lab
 
 # Name: function (lab, trials) that yields a Verdict for each trial; trials in CI; trials of the long test.
 CLASSES = (process_faults.CLASSES | stream_faults.CLASSES | disk_faults.CLASSES | call_faults.CLASSES
-           | environment_faults.CLASSES | path_faults.CLASSES | power_loss.CLASSES)
+           | environment_faults.CLASSES | path_faults.CLASSES | power_loss.CLASSES | live_faults.CLASSES)
 
 
 def run_class(lab, name, trials):

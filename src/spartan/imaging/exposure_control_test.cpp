@@ -83,6 +83,21 @@ TEST(GroundMeter, KnowsAllPixelFormats) {
   }
 }
 
+TEST(GroundMeter, MeasuresAboveTheBlackLevel) {
+  const PixelFormat format{PixelLayout::gray, 12};
+  Rig rig = rig_of(format);
+  for (Camera& camera : rig.cameras) {
+    camera.driver.emplace();
+    camera.driver->black_level = 256;
+  }
+  const auto measure = [&](int ground) {
+    return meter_of(rig).measure(frame_of<std::uint16_t>(format, 4095, ground), Eigen::Vector3d::UnitZ());
+  };
+  EXPECT_NEAR(measure(256 + 384).median, 0.1, 0.002) << "384 of 3839";
+  EXPECT_LT(measure(250).median, 0.001);
+  EXPECT_EQ(measure(4095).saturated, 1);
+}
+
 TEST(GroundMeter, ASelfMaskThatCannotBeReadIsAnError) {
   Rig rig = rig_of();
   rig.cameras[1].self_mask = "nowhere.png";

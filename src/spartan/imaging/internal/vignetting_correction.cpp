@@ -11,6 +11,10 @@ namespace {
 
 constexpr int kVignettingRowsPerPart = 32;  // rows per task; does not affect results
 
+int black_level_of(const Camera& camera) {
+  return camera.driver ? static_cast<int>(std::lround(camera.driver->black_level)) : 0;
+}
+
 }  // namespace
 
 Result<VignettingCorrection> VignettingCorrection::create(const Camera& camera, const ThreadPool& workers) {
@@ -44,7 +48,7 @@ Result<VignettingCorrection> VignettingCorrection::create(const Camera& camera, 
           "cameras." + camera.name + ".vignetting");
     }
   }
-  return VignettingCorrection(std::move(factors), camera.pixel_format.full_scale());
+  return VignettingCorrection(std::move(factors), camera.pixel_format.full_scale(), black_level_of(camera));
 }
 
 template <class T>
@@ -52,15 +56,18 @@ void VignettingCorrection::apply_any(ImageView<const T> image, ImageView<T> resu
   if (image.size() != factors_.size() || result.size() != factors_.size()) {
     throw std::invalid_argument("VignettingCorrection: the images have another size than the camera");
   }
-  const auto full_scale = static_cast<std::uint32_t>(full_scale_);
+  const auto full_scale = static_cast<std::uint32_t>(full_scale_), black = static_cast<std::uint32_t>(black_level_);
   workers.parallel_for(0, image.height(), kVignettingRowsPerPart, [&](int begin, int end) {
-    constexpr std::uint32_t kHalf = 1U << (kFractionBits - 1);
+    constexpr std::uint32_t kOne = 1U << kFractionBits, kHalf = kOne / 2;
     for (int y = begin; y < end; ++y) {
       const T* const in = image.row(y);
       const std::uint16_t* const factors = factors_.row(y);
       T* const out = result.row(y);
       for (int x = 0; x < image.width(); ++x) {
-        const std::uint32_t level = (in[x] * std::uint32_t{factors[x]} + kHalf) >> kFractionBits;
+        // black + (value − black) · factor
+        const std::uint32_t bright = in[x] * std::uint32_t{factors[x]} + kHalf;
+        const std::uint32_t excess = black * (std::uint32_t{factors[x]} - kOne);
+        const std::uint32_t level = bright > excess ? (bright - excess) >> kFractionBits : 0;
         out[x] = static_cast<T>(std::min(level, full_scale));
       }
     }

@@ -10,8 +10,8 @@
 
 namespace spartan::internal {
 
-/// Multiplies each pixel by 1 / Vignetting::relative_illumination, in fixed point with 13 fraction bits. The black
-/// level is taken to be 0.
+/// Multiplies what each pixel has above the black level of the camera (CameraDriver::black_level, else 0) by
+/// 1 / Vignetting::relative_illumination, in fixed point with 13 fraction bits.
 class VignettingCorrection {
  public:
   /// Code `configuration` where the relative illumination of a pixel is not between Vignetting::kMinIllumination and
@@ -26,13 +26,13 @@ class VignettingCorrection {
   static constexpr int kFractionBits = 13;
 
  private:
-  VignettingCorrection(Image<std::uint16_t> factors, int full_scale)
-      : factors_(std::move(factors)), full_scale_(full_scale) {}
+  VignettingCorrection(Image<std::uint16_t> factors, int full_scale, int black_level)
+      : factors_(std::move(factors)), full_scale_(full_scale), black_level_(black_level) {}
   template <class T>
   void apply_any(ImageView<const T> image, ImageView<T> result, const ThreadPool& workers) const;
 
   Image<std::uint16_t> factors_;
-  int full_scale_;
+  int full_scale_, black_level_;
 };
 
 }  // namespace spartan::internal

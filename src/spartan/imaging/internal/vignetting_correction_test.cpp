@@ -54,6 +54,25 @@ TEST(VignettingCorrection, FlattensAFlatField) {
   expect_a_flat_field_flat<std::uint8_t>(shifted, 20, 40, 150);
 }
 
+TEST(VignettingCorrection, LeavesTheBlackLevelWhereItIs) {
+  Camera camera = camera_with({-0.5}, {PixelLayout::gray, 12});
+  camera.driver.emplace();
+  camera.driver->black_level = 256;
+  const auto correction = VignettingCorrection::create(camera, ThreadPool(1));
+  ASSERT_TRUE(correction);
+  const auto corrected = [&](int value, int x, int y) {
+    Image<std::uint16_t> image(64, 48, static_cast<std::uint16_t>(value));
+    correction->apply(image, image, ThreadPool(1));
+    return image(x, y);
+  };
+  EXPECT_EQ(corrected(256, 60, 3), 256) << "no light";
+  const double illumination = light(camera, 30, 25, 60, 3);
+  EXPECT_NEAR(corrected(756, 60, 3), 256 + 500 / illumination, 1);
+  EXPECT_NEAR(corrected(246, 60, 3), 256 - 10 / illumination, 1) << "noise below it";
+  EXPECT_EQ(corrected(0, 60, 3), 0);
+  EXPECT_EQ(corrected(4090, 60, 3), 4095);
+}
+
 TEST(VignettingCorrection, SaturatesAtFullScale) {
   const PixelFormat high{PixelLayout::gray, 12, BitAlignment::high};
   const Camera camera = camera_with({-0.6}, high);

@@ -43,6 +43,8 @@ class CameraDevice {
   virtual DeviceRead read(std::chrono::nanoseconds timeout) = 0;
   /// Whether it can be triggered and its exposure set.
   virtual bool has_controls() const = 0;
+  /// A file: images that are not read are not lost.
+  virtual bool waits() const { return false; }
   /// Takes one image now. Code `configuration`: it cannot; `read_error`: it does not answer.
   virtual Status trigger() = 0;
   /// Codes as trigger().

@@ -23,7 +23,7 @@ struct SpartanCameraImage {
   std::int32_t side;            // 1: of the right camera of two
   std::int64_t frame_id;        // −1: none
   std::int64_t camera_ns;       // stamp of the camera's clock; −1: none
-  std::int64_t age_ns;          // since the host received the beginning of it
+  std::int64_t received_ns;     // when the host received the beginning of it, of the steady clock
   double exposure_us, gain;     // 0: unknown
   void* token;                  // for spartan_camera_release()
 };
@@ -35,6 +35,11 @@ enum SpartanCameraState {
   SPARTAN_CAMERA_LOST = 3
 };
 
+enum SpartanCameraProperty {
+  SPARTAN_CAMERA_CONTROLS = 1,  // it can be triggered and its exposure set
+  SPARTAN_CAMERA_WAITS = 2      // a file: images that are not read are not lost
+};
+
 extern "C" {
 // A handle; null, with the reason in `message` (size bytes), where the device cannot be opened.
 void* spartan_camera_open(const SpartanCameraSettings* settings, char* message, std::size_t size);
@@ -43,8 +48,8 @@ int spartan_camera_read(void* opened, std::int64_t timeout_ns, SpartanCameraImag
                         std::size_t size);
 // Gives the memory of an image back, from any thread, also after spartan_camera_close().
 void spartan_camera_release(void* token);
-// 1: it can be triggered and its exposure set; 0: not.
-int spartan_camera_controls(void* opened);
+// SpartanCameraProperty bits.
+int spartan_camera_properties(void* opened);
 // 1: done; 0, with the reason in `message`: not.
 int spartan_camera_trigger(void* opened, char* message, std::size_t size);
 int spartan_camera_set_exposure(void* opened, double exposure_us, double gain, char* message, std::size_t size);

@@ -23,7 +23,11 @@ bool has_driver(const Rig& rig, const std::string& camera) {
 CameraStream::CameraStream(const StreamInfo& info, const CameraStreamOptions& options, const Log& log)
     : info_(info), options_(options), log_(log) {}
 
-CameraStream::~CameraStream() = default;
+CameraStream::~CameraStream() {
+  const std::lock_guard lock(mutex_);
+  closing_ = true;
+  changed_.notify_all();
+}
 
 Result<std::unique_ptr<CameraStream>> CameraStream::create(const StreamInfo& info, OpenDevice open,
                                                            const CameraStreamOptions& options, const Log& log) {
@@ -87,8 +91,10 @@ void CameraStream::start() {
 }
 
 void CameraStream::add(Feed& feed, int side, StampedImage image) {
-  const std::lock_guard lock(mutex_);
-  if (feed.pairing.waiting(side) >= kMostWaiting) {
+  std::unique_lock lock(mutex_);
+  if (feed.sources[0]->waits()) {
+    changed_.wait(lock, [&] { return feed.pairing.waiting(side) < kMostWaiting || closing_; });
+  } else if (feed.pairing.waiting(side) >= kMostWaiting) {
     feed.pairing.drop_oldest(side);
     ++feed.report.not_taken;
   }
@@ -109,12 +115,13 @@ Status CameraStream::wait_for_previews() {
       auto* const frame = std::get_if<StereoFrame>(&*read.sample);
       if (frame != nullptr) previews_.try_emplace(frame->pair, *frame);
     }
-    samples_.clear();
+    if (!waits()) samples_.clear();
     const auto missing = std::find_if(feeds_.begin(), feeds_.end(),
                                       [&](const auto& feed) { return !previews_.contains(feed->pair.name); });
     if (missing == feeds_.end()) return {};
     if (Clock::now() >= until || all_ended()) {
-      const SourceCounts left = (*missing)->sources.front()->counts(), right = (*missing)->sources.back()->counts();
+      const auto& sources = (*missing)->sources;
+      const SourceCounts left = sources.front()->counts(0), right = sources.back()->counts(sources.size() == 1 ? 1 : 0);
       return failure(ErrorCode::read_error,
                      fmt::format("pair {}: no frame within {:.0f} s ({} images by {}, {} by {})", (*missing)->pair.name,
                                  std::chrono::duration<double>(options_.first_wait).count(), left.images,
@@ -150,12 +157,15 @@ Result<StreamRead> CameraStream::read(std::chrono::nanoseconds timeout) {
   const auto until = Clock::now() + timeout;
   std::unique_lock lock(mutex_);
   if (!reading_) {
-    take_all(Clock::now());
-    samples_.clear();
-    for (const auto& feed : feeds_) {
-      feed->report = {};
-      feed->report.pair = feed->pair.name;
-      feed->skew_sum_ms = 0;
+    // What cameras have taken meanwhile is old; of a file nothing is left out.
+    if (!waits()) {
+      take_all(Clock::now());
+      samples_.clear();
+      for (const auto& feed : feeds_) {
+        feed->report = {};
+        feed->report.pair = feed->pair.name;
+        feed->skew_sum_ms = 0;
+      }
     }
     reading_ = true;
   }
@@ -181,6 +191,13 @@ void CameraStream::take_all(Clock::time_point now) {
                                   [](const auto& source) { return source->is_lost(); });
     while (auto pair = feed->pairing.take(lost ? now + options_.pair_wait : now)) take_pair(*feed, std::move(*pair));
   }
+  changed_.notify_all();
+}
+
+bool CameraStream::waits() const {
+  return std::all_of(feeds_.begin(), feeds_.end(), [](const auto& feed) {
+    return std::all_of(feed->sources.begin(), feed->sources.end(), [](const auto& source) { return source->waits(); });
+  });
 }
 
 void CameraStream::take_pair(Feed& feed, ImagePair pair) {
@@ -320,9 +337,10 @@ std::vector<CameraPairReport> CameraStream::camera_reports() const {
     CameraPairReport report = feed->report;
     if (report.pairs > 0) report.mean_skew_ms = feed->skew_sum_ms / static_cast<double>(report.pairs);
     for (const auto& source : feed->sources) {
-      const SourceCounts counts = source->counts();
-      for (const Camera* camera : source->request().cameras) {
-        report.cameras.push_back({camera->name, counts.images, counts.incomplete, counts.not_received,
+      const auto& cameras = source->request().cameras;
+      for (std::size_t side = 0; side < cameras.size(); ++side) {
+        const SourceCounts counts = source->counts(side);
+        report.cameras.push_back({cameras[side]->name, counts.images, counts.incomplete, counts.not_received,
                                   counts.duplicates, counts.reversed, counts.wrong_stamps, counts.triggers,
                                   counts.unanswered, counts.untriggered, counts.losses, counts.clock_sigma_s * 1e3, (counts.clock_rate - 1) * 1e6});
       }

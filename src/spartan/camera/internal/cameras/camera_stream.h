@@ -39,7 +39,7 @@ class CameraStream : public SampleStream, public CameraControl {
   CameraStream& operator=(const CameraStream&) = delete;
 
   const StreamInfo& info() const override { return info_; }
-  /// Begins with the first frame after the first call.
+  /// Begins with the first frame after the first call; of files with the first one.
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
   /// Null where no camera can be controlled.
   CameraControl* control() override;
@@ -77,6 +77,7 @@ class CameraStream : public SampleStream, public CameraControl {
   void push(Sample sample, std::chrono::steady_clock::time_point arrived);
   Status wait_for_previews();
   bool all_ended() const;
+  bool waits() const;
   std::chrono::steady_clock::time_point next_timeout(std::chrono::steady_clock::time_point latest) const;
   Result<Feed*> feed_of(const std::string& pair);
 
@@ -88,7 +89,7 @@ class CameraStream : public SampleStream, public CameraControl {
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  bool reading_ = false;
+  bool reading_ = false, closing_ = false;
   std::int64_t next_frame_id_ = 0;
   std::deque<StreamRead> samples_;
   std::vector<std::unique_ptr<Feed>> feeds_;  // last: their threads end first

@@ -49,6 +49,7 @@ Result<std::unique_ptr<ImageSource>> ImageSource::create(DeviceRequest request, 
   if (!device) return failure(device);
   source->device_ = std::move(*device);
   source->has_controls_ = source->device_->has_controls();
+  source->waits_ = source->device_->waits();
   return source;
 }
 
@@ -84,9 +85,9 @@ bool ImageSource::is_lost() const {
   return device() == nullptr;
 }
 
-SourceCounts ImageSource::counts() const {
+SourceCounts ImageSource::counts(std::size_t side) const {
   const std::lock_guard lock(mutex_);
-  return counts_;
+  return counts_[side];
 }
 
 Status ImageSource::command(const std::function<void()>& note) {
@@ -147,7 +148,7 @@ Status ImageSource::send_trigger(CameraDevice& device) {
     // Before the trigger, so that an image which comes at once finds it.
     const std::lock_guard lock(mutex_);
     open_triggers_.push_back(now);
-    ++counts_.triggers;
+    ++counts_[0].triggers;
   }
   const Status triggered = device.trigger();
   if (triggered) return {};
@@ -155,22 +156,22 @@ Status ImageSource::send_trigger(CameraDevice& device) {
   const auto open = std::find(open_triggers_.begin(), open_triggers_.end(), now);
   if (open != open_triggers_.end()) {
     open_triggers_.erase(open);
-    ++counts_.unanswered;
+    ++counts_[0].unanswered;
   }
   return triggered;
 }
 
 // The image belongs to the trigger that is nearest to its stamp, of those before its arrival; earlier ones have none.
-void ImageSource::answer_trigger(Stamp stamp, Stamp arrival) {
+void ImageSource::answer_trigger(SourceCounts& counts, Stamp stamp, Stamp arrival) {
   const auto end = std::find_if(open_triggers_.begin(), open_triggers_.end(), [&](Stamp t) { return t > arrival; });
   const auto answered = std::min_element(open_triggers_.begin(), end, [&](Stamp a, Stamp b) {
     return std::abs(seconds_between(stamp, a)) < std::abs(seconds_between(stamp, b));
   });
   if (answered == end) {
-    counts_.untriggered += request_.driver().trigger == CameraDriver::kSoftware;
+    counts.untriggered += request_.driver().trigger == CameraDriver::kSoftware;
     return;
   }
-  counts_.unanswered += answered - open_triggers_.begin();
+  counts.unanswered += answered - open_triggers_.begin();
   open_triggers_.erase(open_triggers_.begin(), answered + 1);
 }
 
@@ -178,7 +179,7 @@ void ImageSource::give_up_triggers() {
   const std::lock_guard lock(mutex_);
   while (!open_triggers_.empty() && seconds_between(open_triggers_.front(), host_.now()) > kAnswer_s) {
     open_triggers_.pop_front();
-    ++counts_.unanswered;
+    ++counts_[0].unanswered;
   }
 }
 
@@ -200,7 +201,7 @@ void ImageSource::run() {
                              read.reason));
       const std::lock_guard lock(mutex_);
       device_ = nullptr;
-      ++counts_.losses;
+      ++counts_[0].losses;
     }
   }
   ended_ = true;
@@ -229,32 +230,35 @@ void ImageSource::deliver(CameraImage image) {
   StampedImage stamped = this->stamped(std::move(image));
   {
     const std::lock_guard lock(mutex_);
-    if (fresh) ++(stamped.image.image.empty() ? counts_.incomplete : counts_.images);
-    if (fresh) answer_trigger(stamped.stamp, host_.stamp_of(stamped.image.complete));
-    if (!stamped.trusted) ++counts_.wrong_stamps;
-    counts_.clock_sigma_s = stamped.sigma_s;
-    counts_.clock_rate = clocks_[0].rate();
+    SourceCounts& counts = counts_[static_cast<std::size_t>(side)];
+    if (fresh) ++(stamped.image.image.empty() ? counts.incomplete : counts.images);
+    if (fresh) answer_trigger(counts, stamped.stamp, host_.stamp_of(stamped.image.complete));
+    if (!stamped.trusted) ++counts.wrong_stamps;
+    counts.clock_sigma_s = stamped.sigma_s;
+    counts.clock_rate = clocks_[static_cast<std::size_t>(side)].rate();
   }
   if (fresh) deliver_(side, std::move(stamped));
 }
 
 // Counts what the camera has left out; false of an image that came before.
 bool ImageSource::is_new(const CameraImage& image) {
-  Last& last = last_[image.side == 0 ? 0 : 1];
+  const std::size_t side = image.side == 0 ? 0 : 1;
+  Last& last = last_[side];
   const std::lock_guard lock(mutex_);
+  SourceCounts& counts = counts_[side];
   if (image.frame_id >= 0 && last.frame_id >= 0) {
     const std::int64_t step = image.frame_id - last.frame_id;
     if (step == 0) {
-      ++counts_.duplicates;
+      ++counts.duplicates;
       return false;
     }
     if (step < 0 && step > -kMostLeftOut) {
-      ++counts_.reversed;
+      ++counts.reversed;
       return false;
     }
-    if (step > 1 && step <= kMostLeftOut) counts_.not_received += step - 1;
+    if (step > 1 && step <= kMostLeftOut) counts.not_received += step - 1;
   } else if (image.camera_ns >= 0 && image.camera_ns == last.camera_ns) {
-    ++counts_.duplicates;
+    ++counts.duplicates;
     return false;
   }
   last = {image.frame_id, image.camera_ns};

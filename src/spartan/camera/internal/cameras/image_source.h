@@ -47,7 +47,7 @@ class HostClock {
   std::int64_t epoch_ns_;
 };
 
-/// What a device has delivered so far.
+/// What one camera of a device has delivered so far. Triggers and losses count for the first one.
 struct SourceCounts {
   std::int64_t images = 0;        ///< those that are complete
   std::int64_t incomplete = 0;    ///< packets of them are missing
@@ -82,11 +82,13 @@ class ImageSource {
   /// The camera does not answer now.
   bool is_lost() const;
   bool has_controls() const { return has_controls_; }
+  bool waits() const { return waits_; }
   /// They return at once; what the camera refuses is logged. Codes: `read_error` (the camera does not answer now; an
   /// exposure is set when it does), `configuration` (it cannot be controlled).
   Status trigger();
   Status set_exposure(const ExposureSettings& settings);
-  SourceCounts counts() const;
+  /// Of a camera of the request.
+  SourceCounts counts(std::size_t side) const;
   const DeviceRequest& request() const { return request_; }
 
   static constexpr std::chrono::milliseconds kRetry{1000}, kPoll{50};
@@ -102,7 +104,7 @@ class ImageSource {
   void report(const Status& status);
   void deliver(CameraImage image);
   bool is_new(const CameraImage& image);
-  void answer_trigger(Stamp stamp, Stamp arrival);
+  void answer_trigger(SourceCounts& counts, Stamp stamp, Stamp arrival);
   void give_up_triggers();
   StampedImage stamped(CameraImage image);
   std::shared_ptr<CameraDevice> device() const;
@@ -112,7 +114,7 @@ class ImageSource {
   OpenDevice open_;
   const HostClock& host_;
   Log log_;
-  bool has_controls_ = false;
+  bool has_controls_ = false, waits_ = false;
   Deliver deliver_;
   std::function<void()> changed_;
 
@@ -121,7 +123,7 @@ class ImageSource {
   std::shared_ptr<CameraDevice> device_;  // null: lost
   std::optional<ExposureSettings> exposure_, pending_exposure_;
   int pending_triggers_ = 0;
-  SourceCounts counts_;
+  std::array<SourceCounts, 2> counts_;  // by side
   std::deque<Stamp> open_triggers_;  // not answered yet
   bool stop_ = false;
   std::atomic<bool> ended_ = false;

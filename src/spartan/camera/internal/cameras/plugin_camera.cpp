@@ -23,7 +23,7 @@ struct CameraPlugin {
   decltype(&spartan_camera_open) open = nullptr;
   decltype(&spartan_camera_read) read = nullptr;
   decltype(&spartan_camera_release) release = nullptr;
-  decltype(&spartan_camera_controls) controls = nullptr;
+  decltype(&spartan_camera_properties) properties = nullptr;
   decltype(&spartan_camera_trigger) trigger = nullptr;
   decltype(&spartan_camera_set_exposure) set_exposure = nullptr;
   decltype(&spartan_camera_close) close = nullptr;
@@ -40,7 +40,7 @@ Result<CameraPlugin> load_camera_plugin(bool aravis) {
   for (const Status& found :
        {library->find("spartan_camera_open", plugin.open), library->find("spartan_camera_read", plugin.read),
         library->find("spartan_camera_release", plugin.release),
-        library->find("spartan_camera_controls", plugin.controls),
+        library->find("spartan_camera_properties", plugin.properties),
         library->find("spartan_camera_trigger", plugin.trigger),
         library->find("spartan_camera_set_exposure", plugin.set_exposure),
         library->find("spartan_camera_close", plugin.close)}) {
@@ -72,7 +72,8 @@ class PluginCamera : public CameraDevice {
   PluginCamera& operator=(const PluginCamera&) = delete;
 
   DeviceRead read(std::chrono::nanoseconds timeout) override;
-  bool has_controls() const override { return plugin_.controls(handle_) != 0; }
+  bool has_controls() const override { return (plugin_.properties(handle_) & SPARTAN_CAMERA_CONTROLS) != 0; }
+  bool waits() const override { return (plugin_.properties(handle_) & SPARTAN_CAMERA_WAITS) != 0; }
   Status trigger() override {
     Message message{};
     return plugin_.trigger(handle_, message.data(), message.size()) != 0 ? Status() : refused(message);
@@ -124,7 +125,7 @@ CameraImage PluginCamera::image_of(const SpartanCameraImage& image) const {
   out.frame_id = image.frame_id;
   out.camera_ns = image.camera_ns;
   out.complete = std::chrono::steady_clock::now();
-  out.began = out.complete - std::chrono::nanoseconds(image.age_ns);
+  out.began = std::chrono::steady_clock::time_point(std::chrono::nanoseconds(image.received_ns));
   out.exposure_us = image.exposure_us;
   out.gain = image.gain;
   std::shared_ptr<const void> owner(image.token, plugin_.release);
