@@ -247,7 +247,8 @@ int deliver(CameraPipeline& opened, const QueuedSample& taken, SpartanCameraImag
     SpartanCameraImage right = image;
     right.side = 1;
     if (sample->pixels != nullptr)
-      right.pixels = sample->pixels + static_cast<std::ptrdiff_t>(image.width) * image.bytes_per_sample * image.channels;
+      right.pixels =
+          sample->pixels + static_cast<std::ptrdiff_t>(image.width) * image.bytes_per_sample * image.channels;
     right.token = new Token{sample};
     opened.right = right;
   }

@@ -79,7 +79,11 @@ void add_record(CLI::App& app, Context& context) {
   CLI::App* command = add_command(
       app, context, "record", "Record a live stream: images and sensor samples at their full rate",
       "record replay:$SPARTAN_DATA/kitti_06 -o recorded_06", [&context, a] { return record_command(context, *a); });
-  command->add_option("input", a->input, "Address of the live stream: live:RIG, aravis:LEFT,RIGHT, gst:PIPELINE, replay:FOLDER or sim:SCENARIO.")->required();
+  command
+      ->add_option(
+          "input", a->input,
+          "Address of the live stream: live:RIG, aravis:LEFT,RIGHT, gst:PIPELINE, replay:FOLDER or sim:SCENARIO.")
+      ->required();
   command->add_option("-o,--output", a->output, "Folder of the recording to create.")->required();
   command->add_option("--rig", a->recording.rig,
                       "Calibration file to use, in any supported format (default: that of the stream).");

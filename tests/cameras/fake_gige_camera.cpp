@@ -63,15 +63,14 @@ void fill(ArvBuffer* buffer, void* data, guint32, guint32, ArvPixelFormat) {
 int main(int count, char** arguments) {
   if (count < 4) return 2;
   Scene scene = scene_of(count, arguments);
-  auto* const camera = static_cast<ArvGvFakeCamera*>(
-      g_object_new(ARV_TYPE_GV_FAKE_CAMERA, "interface-name", arguments[1], "serial-number", arguments[2],
-                   "gvsp-lost-ratio", std::atof(arguments[3]), nullptr));
+  auto* const camera = static_cast<ArvGvFakeCamera*>(g_object_new(ARV_TYPE_GV_FAKE_CAMERA, "interface-name",
+                                                                  arguments[1], "serial-number", arguments[2],
+                                                                  "gvsp-lost-ratio", std::atof(arguments[3]), nullptr));
   if (!arv_gv_fake_camera_is_running(camera)) {
     std::fprintf(stderr, "cannot listen at %s\n", arguments[1]);
     return 1;
   }
-  if (!scene.files.empty())
-    arv_fake_camera_set_fill_pattern(arv_gv_fake_camera_get_fake_camera(camera), fill, &scene);
+  if (!scene.files.empty()) arv_fake_camera_set_fill_pattern(arv_gv_fake_camera_get_fake_camera(camera), fill, &scene);
   std::puts("ready");
   std::fflush(stdout);
   for (;;) std::this_thread::sleep_for(std::chrono::hours(1));

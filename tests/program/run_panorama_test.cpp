@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <numbers>
@@ -161,6 +162,13 @@ TEST_F(RunPanorama, ByAnEmulatedUnitOnASerialLine) {
     EXPECT_NEAR(views[i].pan_rad, (20.0 * static_cast<double>(i) - 20) * kDegree, step_rad);
     EXPECT_NEAR(views[i].tilt_rad, 45 * kDegree, step_rad);
   }
+  // What its steps leave of an angle enters the variance of the maps, beside the error of its calibration.
+  const std::string options = read_file(folder_.path() + "/run/config.yaml").value();
+  const std::size_t key = options.find("pan_tilt_deg:");
+  ASSERT_NE(key, std::string::npos);
+  const auto& stated = simulation.info().rig.calibration_errors;
+  const double stated_deg = stated ? stated->pan_tilt_deg : CalibrationErrors().pan_tilt_deg;
+  EXPECT_NEAR(std::stod(options.substr(key + 13)), std::hypot(stated_deg, step_rad / kDegree / std::sqrt(12.0)), 1e-9);
 }
 
 TEST_F(RunPanorama, NeedsAUnit) {

@@ -28,6 +28,7 @@ std::string describe(const CameraPairReport& report) {
   text += counts_text({{report.left_alone, "left images alone"},
                        {report.right_alone, "right images alone"},
                        {report.incomplete, "with an incomplete image"},
+                       {report.apart, "with images apart in time"},
                        {report.wrong_size, "with an image of another size"},
                        {report.stamps_reversed, "with reversed stamps"},
                        {report.not_taken, "images not taken in time"}});

@@ -36,7 +36,8 @@ Result<std::array<std::string, 2>> sources_of(const std::string& address) {
   if (!address.starts_with(internal::kAravis)) return std::array{address, address};
   const std::string ids = address.substr(internal::kAravis.size());
   const std::size_t comma = ids.find(',');
-  if (comma == 0 || comma == std::string::npos || comma + 1 == ids.size() || ids.find(',', comma + 1) != std::string::npos)
+  if (comma == 0 || comma == std::string::npos || comma + 1 == ids.size() ||
+      ids.find(',', comma + 1) != std::string::npos)
     return failure(ErrorCode::usage, "does not name two cameras", address, "use aravis:LEFT,RIGHT");
   const std::string kind(internal::kAravis);
   return std::array{kind + ids.substr(0, comma), kind + ids.substr(comma + 1)};

@@ -54,9 +54,9 @@ struct StreamRead {
 /// What one camera of a live stream has delivered so far.
 struct CameraReport {
   std::string camera;
-  std::int64_t images = 0;        ///< complete ones
-  std::int64_t incomplete = 0;    ///< packets of them were lost
-  std::int64_t not_received = 0;  ///< left out in the count of the camera
+  std::int64_t images = 0;                    ///< complete ones
+  std::int64_t incomplete = 0;                ///< packets of them were lost
+  std::int64_t not_received = 0;              ///< left out in the count of the camera
   std::int64_t duplicates = 0, reversed = 0;  ///< discarded: the same image again; one from before
   std::int64_t wrong_stamps = 0;              ///< the time of the image was taken from its arrival
   std::int64_t triggers = 0;                  ///< sent by software
@@ -73,6 +73,7 @@ struct CameraPairReport {
   std::int64_t pairs = 0;                        ///< frames with both images
   std::int64_t left_alone = 0, right_alone = 0;  ///< images without one of the other camera
   std::int64_t incomplete = 0;                   ///< frames with an image that is not complete
+  std::int64_t apart = 0;                        ///< frames whose images answer one trigger at different times
   std::int64_t wrong_size = 0, stamps_reversed = 0, not_taken = 0;  ///< frames; images that waited for too long
   double mean_skew_ms = 0, largest_skew_ms = 0;                     ///< stamp of the right image minus the left one
   std::vector<CameraReport> cameras;                                ///< left, right

@@ -279,8 +279,9 @@ std::string camera_lines(const Camera& camera) {
     text += fmt::format("    vignetting_centre_px: {}\n", list(*camera.vignetting.centre_px));
   }
   if (!camera.self_mask.empty()) text += fmt::format("    self_mask: {}\n", yaml_quoted(camera.self_mask));
-  return text + fmt::format("    mount: {}\n    axes: optical\n{}", yaml_quoted(camera.mount),
-                            pose_lines(camera.mount_from_camera)) +
+  return text +
+         fmt::format("    mount: {}\n    axes: optical\n{}", yaml_quoted(camera.mount),
+                     pose_lines(camera.mount_from_camera)) +
          (camera.driver ? internal::camera_driver_lines(*camera.driver) : "");
 }
 

@@ -59,6 +59,11 @@ TEST(RigYaml, ReadsTheDriverOfACamera) {
   const CameraDriver wanted{"aravis:Vendor-7", CameraDriver::kSoftware, 12.5, 16, StampAt::exposure_end, 3.5};
   EXPECT_EQ(rig->cameras[0].driver, wanted);
   EXPECT_EQ(*parse_rig_yaml(to_rig_yaml(*rig), "again.yaml"), *rig);
+  const auto documented =
+      parse_rig_yaml(replaced(kGood, "pairs:", testing::doc_example("driver") + "pairs:"), "my.yaml");
+  ASSERT_TRUE(documented) << documented.error().message();
+  EXPECT_EQ(documented->cameras[1].driver,
+            (CameraDriver{"aravis:Vendor-1234", CameraDriver::kSoftware, 10, 64, StampAt::exposure_start, 4}));
   EXPECT_EQ(parse_rig_yaml(with("{source: 'gst:videotestsrc'}"), "my.yaml")->cameras[0].driver,
             (CameraDriver{"gst:videotestsrc"}));
   const auto fault = [&](const std::string& driver) {

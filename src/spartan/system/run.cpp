@@ -336,6 +336,15 @@ Result<std::unique_ptr<Panorama>> panorama_of(SampleStream& stream, PanTiltContr
   return Panorama::create(stream.info().rig, request.options.panorama, *unit, stream.control(), hooks);
 }
 
+// The error of the unit adds to that of its calibration in the variance of the maps.
+RunOptions with_unit_error(RunOptions options, const Rig& rig, const PanTiltControl& unit) {
+  double& pan_tilt_deg = options.mapping.map.calibration.pan_tilt_deg;
+  if (pan_tilt_deg == CalibrationErrors().pan_tilt_deg && rig.calibration_errors)
+    pan_tilt_deg = rig.calibration_errors->pan_tilt_deg;
+  pan_tilt_deg = std::hypot(pan_tilt_deg, unit.sigma_rad() / kRadiansPerDegree);
+  return options;
+}
+
 // The last commit cannot notice that the store is removed while SQLite closes it.
 Result<RunOutcome> with_store(Result<RunOutcome> outcome, const std::string& store) {
   if (!outcome) return outcome;
@@ -362,12 +371,14 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
   }
 }
 
-Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, const RunHooks& hooks) {
+Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& given, const RunHooks& hooks) {
   const RunStart start;
+  RunRequest request = given;
   const StereoPair* const odometry = odometry_pair_of(stream.info().rig, request.options);
   try {
     auto unit = request.pan_tilt.empty() ? std::unique_ptr<PanTiltControl>() : open_pan_tilt(request.pan_tilt);
     if (!unit) return failure(unit);
+    if (*unit) request.options = with_unit_error(request.options, stream.info().rig, **unit);
     auto panorama = panorama_of(stream, unit->get(), request, hooks);
     if (!panorama) return failure(panorama);
     std::optional<PanoramaStream> labelled;

@@ -35,7 +35,8 @@ struct Video::Plugin {
   decltype(&spartan_video_close) close = nullptr;
 
   static Result<std::shared_ptr<const Plugin>> load() {
-    const auto library = PluginLibrary::load("libspartan_video.so", "SPARTAN_VIDEO", "videos need", "extract the images");
+    const auto library =
+        PluginLibrary::load("libspartan_video.so", "SPARTAN_VIDEO", "videos need", "extract the images");
     if (!library) return failure(library);
     auto plugin = std::make_shared<Plugin>();
     for (const Status& found :

@@ -1,9 +1,9 @@
+#include "spartan/rig/internal/camera_driver.h"
+
 #include <fmt/format.h>
 
 #include <array>
 #include <utility>
-
-#include "spartan/rig/internal/camera_driver.h"
 
 namespace spartan::internal {
 namespace {
@@ -15,7 +15,8 @@ constexpr std::array<std::pair<const char*, StampAt>, 3> kMoments{{{"exposure_st
 double number_between(YamlMap& map, const char* key, double low, double high) {
   if (!map.has(key)) return 0;
   const double value = map.number(key).value_or(low);
-  if (!(value >= low && value <= high)) map.add_error(key, fmt::format("is {}, must be between {} and {}", value, low, high));
+  if (!(value >= low && value <= high))
+    map.add_error(key, fmt::format("is {}, must be between {} and {}", value, low, high));
   return value;
 }
 

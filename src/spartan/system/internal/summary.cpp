@@ -107,6 +107,7 @@ Json camera_pairs(const std::vector<CameraPairReport>& reports) {
                      {"left_alone", report.left_alone},
                      {"right_alone", report.right_alone},
                      {"incomplete", report.incomplete},
+                     {"apart", report.apart},
                      {"wrong_size", report.wrong_size},
                      {"stamps_reversed", report.stamps_reversed},
                      {"not_taken", report.not_taken},

@@ -36,8 +36,8 @@ class CameraClock {
   std::int64_t restarts() const { return restarts_; }
 
   static constexpr double kBin_s = 0.5, kWindow_s = 60;
-  static constexpr double kLeastSpan_s = 10;        ///< of the fit of a rate; a shorter one takes 1
-  static constexpr double kLargestRate = 5e-4;      ///< of rate() − 1; that of a crystal is a tenth
+  static constexpr double kLeastSpan_s = 10;         ///< of the fit of a rate; a shorter one takes 1
+  static constexpr double kLargestRate = 5e-4;       ///< of rate() − 1; that of a crystal is a tenth
   static constexpr double kLeastTolerance_s = 0.02;  ///< by which an arrival may be earlier than all before
   static constexpr std::size_t kRestarts = 3;
   static constexpr double kFirstSigma_s = 0.03;  ///< of the smallest delay by one arrival; of more, over their number

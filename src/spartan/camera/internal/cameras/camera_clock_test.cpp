@@ -24,7 +24,8 @@ class FakeClock {
   Image next(const std::function<double(std::mt19937_64&)>& delay_s) {
     const double camera_s = 0.1 * count_++;
     const auto taken_ns = static_cast<std::int64_t>(1.8e18) + std::llround(kRate * camera_s * 1e9);
-    return {std::llround(camera_s * 1e9) + 77'000'000, Stamp{taken_ns}, Stamp{taken_ns + std::llround(delay_s(random_) * 1e9)}};
+    return {std::llround(camera_s * 1e9) + 77'000'000, Stamp{taken_ns},
+            Stamp{taken_ns + std::llround(delay_s(random_) * 1e9)}};
   }
 
  private:

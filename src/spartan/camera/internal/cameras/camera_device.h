@@ -14,13 +14,13 @@ namespace spartan::internal {
 
 /// One image as a driver delivers it.
 struct CameraImage {
-  FrameImage image;               ///< empty: it is not complete
-  int side = 0;                   ///< 1: of the second camera of a device with two
-  std::int64_t frame_id = -1;     ///< counted by the camera; −1: it does not count
-  std::int64_t camera_ns = -1;    ///< stamp of the camera's clock; −1: it has none
+  FrameImage image;             ///< empty: it is not complete
+  int side = 0;                 ///< 1: of the second camera of a device with two
+  std::int64_t frame_id = -1;   ///< counted by the camera; −1: it does not count
+  std::int64_t camera_ns = -1;  ///< stamp of the camera's clock; −1: it has none
   /// When the host received the beginning of it, and when it had all of it.
   std::chrono::steady_clock::time_point began, complete;
-  double exposure_us = 0, gain = 0;                ///< 0: unknown
+  double exposure_us = 0, gain = 0;  ///< 0: unknown
 };
 
 /// What read() has found.

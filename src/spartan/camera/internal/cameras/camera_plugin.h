@@ -6,26 +6,26 @@
 
 /// What the rig wants of a device. A text is valid during the call.
 struct SpartanCameraSettings {
-  const char* source;        // of the driver without its kind: "Vendor-Serial", "v4l2src ! …"
-  std::int32_t cameras;      // 2: left and right behind one device
+  const char* source;          // of the driver without its kind: "Vendor-Serial", "v4l2src ! …"
+  std::int32_t cameras;        // 2: left and right behind one device
   std::int32_t width, height;  // of one image
-  std::int32_t bits;         // significant bits of a sample, 8 to 16
-  const char* layout;        // name_of(PixelLayout)
-  const char* trigger;       // "free", "software", or an input of the camera
-  double rate_hz;            // 0: as the camera is set
+  std::int32_t bits;           // significant bits of a sample, 8 to 16
+  const char* layout;          // name_of(PixelLayout)
+  const char* trigger;         // "free", "software", or an input of the camera
+  double rate_hz;              // 0: as the camera is set
 };
 
 /// An image that the plugin keeps until spartan_camera_release().
 struct SpartanCameraImage {
-  const void* pixels;           // null: the image is not complete
+  const void* pixels;  // null: the image is not complete
   std::ptrdiff_t stride_bytes;
   std::int32_t width, height, bytes_per_sample, channels;
-  std::int32_t side;            // 1: of the right camera of two
-  std::int64_t frame_id;        // −1: none
-  std::int64_t camera_ns;       // stamp of the camera's clock; −1: none
-  std::int64_t received_ns;     // when the host received the beginning of it, of the steady clock
-  double exposure_us, gain;     // 0: unknown
-  void* token;                  // for spartan_camera_release()
+  std::int32_t side;         // 1: of the right camera of two
+  std::int64_t frame_id;     // −1: none
+  std::int64_t camera_ns;    // stamp of the camera's clock; −1: none
+  std::int64_t received_ns;  // when the host received the beginning of it, of the steady clock
+  double exposure_us, gain;  // 0: unknown
+  void* token;               // for spartan_camera_release()
 };
 
 enum SpartanCameraState {

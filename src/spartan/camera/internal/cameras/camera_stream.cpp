@@ -35,8 +35,9 @@ Result<std::unique_ptr<CameraStream>> CameraStream::create(const StreamInfo& inf
   for (const StereoPair& pair : stream->info_.rig.pairs) {
     const bool left = has_driver(stream->info_.rig, pair.left), right = has_driver(stream->info_.rig, pair.right);
     if (left != right) {
-      return failure(ErrorCode::configuration, fmt::format("cameras.{}: has no driver, the other camera of pair {} has one",
-                                                           left ? pair.right : pair.left, pair.name),
+      return failure(ErrorCode::configuration,
+                     fmt::format("cameras.{}: has no driver, the other camera of pair {} has one",
+                                 left ? pair.right : pair.left, pair.name),
                      info.rig_source);
     }
     if (!left) continue;
@@ -187,8 +188,8 @@ Result<StreamRead> CameraStream::read(std::chrono::nanoseconds timeout) {
 void CameraStream::take_all(Clock::time_point now) {
   for (const auto& feed : feeds_) {
     // A partner of a camera that does not answer is not waited for.
-    const bool lost = std::any_of(feed->sources.begin(), feed->sources.end(),
-                                  [](const auto& source) { return source->is_lost(); });
+    const bool lost =
+        std::any_of(feed->sources.begin(), feed->sources.end(), [](const auto& source) { return source->is_lost(); });
     while (auto pair = feed->pairing.take(lost ? now + options_.pair_wait : now)) take_pair(*feed, std::move(*pair));
   }
   changed_.notify_all();
@@ -284,6 +285,13 @@ std::optional<MissingFrame> CameraStream::fault_of(Feed& feed, const ImagePair& 
                                   image.width(), image.height(), size.width, size.height);
     return missing;
   }
+  if (feed.pairing.is_apart(pair)) {
+    ++feed.report.apart;
+    missing.fault = FrameFault::stamps_apart;
+    missing.message = fmt::format("the images of one trigger were taken {:.1f} ms apart",
+                                  1e3 * std::abs(seconds_between(frame.left_stamp, frame.right_stamp)));
+    return missing;
+  }
   if (feed.last_stamp && frame.left_stamp <= *feed.last_stamp) {
     ++feed.report.stamps_reversed;
     missing.fault = FrameFault::stamp_reversed;
@@ -313,9 +321,14 @@ CameraControl* CameraStream::control() {
 Status CameraStream::trigger(const std::string& pair) {
   const auto feed = feed_of(pair);
   if (!feed) return failure(feed);
+  std::int64_t number = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    number = next_trigger_++;
+  }
   Status all;
   for (const auto& source : (*feed)->sources) {
-    if (Status triggered = source->trigger(); !triggered) all = triggered;
+    if (Status triggered = source->trigger(number); !triggered) all = triggered;
   }
   return all;
 }
@@ -342,7 +355,8 @@ std::vector<CameraPairReport> CameraStream::camera_reports() const {
         const SourceCounts counts = source->counts(side);
         report.cameras.push_back({cameras[side]->name, counts.images, counts.incomplete, counts.not_received,
                                   counts.duplicates, counts.reversed, counts.wrong_stamps, counts.triggers,
-                                  counts.unanswered, counts.untriggered, counts.losses, counts.clock_sigma_s * 1e3, (counts.clock_rate - 1) * 1e6});
+                                  counts.unanswered, counts.untriggered, counts.losses, counts.clock_sigma_s * 1e3,
+                                  (counts.clock_rate - 1) * 1e6});
       }
     }
     reports.push_back(std::move(report));

@@ -21,8 +21,8 @@
 namespace spartan::internal {
 
 struct CameraStreamOptions {
-  double pair_tolerance_s = 0.005;           ///< as in OpenOptions
-  std::chrono::milliseconds pair_wait{200};  ///< for the other image of a pair, and for that of a trigger
+  double pair_tolerance_s = 0.005;              ///< as in OpenOptions
+  std::chrono::milliseconds pair_wait{200};     ///< for the other image of a pair, and for that of a trigger
   std::chrono::milliseconds first_wait{10000};  ///< for the first frame of each pair
 };
 
@@ -54,8 +54,7 @@ class CameraStream : public SampleStream, public CameraControl {
  private:
   // The devices of a pair and what they have delivered.
   struct Feed {
-    explicit Feed(const CameraStreamOptions& options)
-        : pairing(options.pair_tolerance_s, options.pair_wait) {}
+    explicit Feed(const CameraStreamOptions& options) : pairing(options.pair_tolerance_s, options.pair_wait) {}
     StereoPair pair;
     std::vector<std::unique_ptr<ImageSource>> sources;
     ImagePairing pairing;
@@ -90,7 +89,7 @@ class CameraStream : public SampleStream, public CameraControl {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   bool reading_ = false, closing_ = false;
-  std::int64_t next_frame_id_ = 0;
+  std::int64_t next_frame_id_ = 0, next_trigger_ = ImageSource::kFirstCommanded;
   std::deque<StreamRead> samples_;
   std::vector<std::unique_ptr<Feed>> feeds_;  // last: their threads end first
 };

@@ -39,7 +39,22 @@ ImagePair ImagePairing::take_one(std::size_t side) {
   return pair;
 }
 
+double ImagePairing::tolerance_s(const StampedImage& left, const StampedImage& right) const {
+  const double sigmas_s = 2 * std::hypot(left.sigma_s, right.sigma_s);
+  return tolerance_s_ + std::min(sigmas_s, tolerance_s_);
+}
+
+bool ImagePairing::is_apart(const ImagePair& pair) const {
+  const StampedImage &left = *pair.images[0], &right = *pair.images[1];
+  if (!left.trusted || !right.trusted) return false;
+  return std::abs(seconds_between(left.stamp, right.stamp)) > tolerance_s(left, right);
+}
+
 int ImagePairing::compare(const StampedImage& left, const StampedImage& right) {
+  if (left.trigger >= 0 && right.trigger >= 0) {
+    if (left.trigger == right.trigger) return 0;
+    return left.trigger < right.trigger ? -1 : 1;
+  }
   const bool trusted = left.trusted && right.trusted;
   const bool counted = left.image.frame_id >= 0 && right.image.frame_id >= 0;
   const std::int64_t difference = right.image.frame_id - left.image.frame_id;
@@ -48,9 +63,7 @@ int ImagePairing::compare(const StampedImage& left, const StampedImage& right) {
     return difference > *id_difference_ ? -1 : 1;
   }
   const double later_s = seconds_between(left.stamp, right.stamp);
-  const double sigmas_s = 2 * std::hypot(left.sigma_s, right.sigma_s);
-  const double tolerance_s = tolerance_s_ + std::min(sigmas_s, tolerance_s_);
-  if (std::abs(later_s) > tolerance_s) return later_s > 0 ? -1 : 1;
+  if (std::abs(later_s) > tolerance_s(left, right)) return later_s > 0 ? -1 : 1;
   if (trusted && counted) learn(difference);
   return 0;
 }

@@ -17,9 +17,10 @@ namespace spartan::internal {
 /// An image on the clock of the host.
 struct StampedImage {
   CameraImage image;
-  Stamp stamp;            ///< mid-exposure
-  bool trusted = true;    ///< false: `stamp` follows from the arrival (MappedStamp::trusted)
-  double sigma_s = 0;     ///< of the stamp
+  Stamp stamp;                ///< mid-exposure
+  bool trusted = true;        ///< false: `stamp` follows from the arrival (MappedStamp::trusted)
+  double sigma_s = 0;         ///< of the stamp
+  std::int64_t trigger = -1;  ///< number of the trigger that it answers, the same for both cameras; −1: none
 };
 
 /// At least one image.
@@ -30,10 +31,11 @@ struct ImagePair {
   const StampedImage& first() const { return images[0] ? *images[0] : *images[1]; }
 };
 
-/// Images belong together where their stamps differ by less than a tolerance, which grows up to twofold with the standard
-/// deviation of that difference. Where one of the stamps is not trusted,
-/// the frame ids decide: their difference is that of the last kLearned pairs with trusted stamps. So a wrong stamp
-/// harms at most its own pair, and a camera that leaves out images, or counts from a new start, is followed.
+/// Images that answer the same trigger belong together. Without triggers they do where their stamps differ by less than
+/// a tolerance, which grows up to twofold with the standard deviation of that difference. Where one of the stamps is
+/// not trusted, the frame ids decide: their difference is that of the last kLearned pairs with trusted stamps. So a
+/// wrong stamp harms at most its own pair, and a camera that leaves out images, or counts from a new start, is
+/// followed.
 ///
 /// Images of one camera come in order. One without a partner is returned alone, when its partner can no longer come:
 /// the other camera has delivered a later one, or `wait` has passed.
@@ -47,6 +49,8 @@ class ImagePairing {
   void add(int side, StampedImage image) { waiting_[side_of(side)].push_back(std::move(image)); }
   std::size_t waiting(int side) const { return waiting_[side_of(side)].size(); }
   void drop_oldest(int side) { waiting_[side_of(side)].pop_front(); }
+  /// Whether the stamps of a complete pair differ by more than the tolerance, as after a trigger that came late.
+  bool is_apart(const ImagePair& pair) const;
   /// The next pair, in order of time.
   std::optional<ImagePair> take(Time now);
   /// When take() may return an image that has waited for long enough. None: nothing waits.
@@ -58,6 +62,7 @@ class ImagePairing {
   static std::size_t side_of(int side) { return side == 0 ? 0 : 1; }
   /// Less than 0: the left one has no partner; more: the right one; 0: they are a pair.
   int compare(const StampedImage& left, const StampedImage& right);
+  double tolerance_s(const StampedImage& left, const StampedImage& right) const;
   void learn(std::int64_t difference);
   ImagePair take_one(std::size_t side);
 

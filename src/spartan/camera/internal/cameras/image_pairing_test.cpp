@@ -73,6 +73,27 @@ TEST(ImagePairing, FrameIdsDecideWhereAStampIsWrong) {
   EXPECT_THAT(take_all(pairing, 610), ElementsAre("460+400", "+600", "600+601"));
 }
 
+TEST(ImagePairing, TriggersDecideWhereThereAreAny) {
+  ImagePairing pairing(0.005, milliseconds(200));
+  const auto add = [&](int side, int time_ms, std::int64_t trigger) {
+    StampedImage image = image_at(time_ms);
+    image.trigger = trigger;
+    pairing.add(side, std::move(image));
+  };
+  add(0, 0, 7);
+  add(1, 3, 7);
+  add(0, 100, 8);
+  add(1, 130, 8);  // sent late
+  add(0, 200, 9);  // the right camera has none
+  add(0, 300, 10);
+  add(1, 300, 10);
+  const auto first = pairing.take(kStart + milliseconds(310)), second = pairing.take(kStart + milliseconds(310));
+  ASSERT_TRUE(first && first->is_complete() && second && second->is_complete());
+  EXPECT_FALSE(pairing.is_apart(*first));
+  EXPECT_TRUE(pairing.is_apart(*second));
+  EXPECT_THAT(take_all(pairing, 310), ElementsAre("200+", "300+300"));
+}
+
 TEST(ImagePairing, ACameraThatCountsFromANewStartIsFollowed) {
   ImagePairing pairing(0.005, milliseconds(200));
   for (int i = 0; i < 10; ++i) {

@@ -31,9 +31,9 @@ std::string DeviceRequest::names() const {
 
 HostClock::HostClock()
     : steady_(Clock::now()),
-      epoch_ns_(std::chrono::duration_cast<std::chrono::nanoseconds>(
-                    std::chrono::system_clock::now().time_since_epoch())
-                    .count()) {}
+      epoch_ns_(
+          std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+              .count()) {}
 
 Stamp HostClock::stamp_of(Time time) const {
   return Stamp{epoch_ns_ + std::chrono::duration_cast<std::chrono::nanoseconds>(time - steady_).count()};
@@ -98,8 +98,10 @@ Status ImageSource::command(const std::function<void()>& note) {
   return device_ ? Status() : failure(ErrorCode::read_error, "does not answer", request_.names());
 }
 
-Status ImageSource::trigger() {
-  return command([this] { pending_triggers_ += device_ ? 1 : 0; });
+Status ImageSource::trigger(std::int64_t number) {
+  return command([&] {
+    if (device_) pending_triggers_.push_back(number);
+  });
 }
 
 Status ImageSource::set_exposure(const ExposureSettings& settings) {
@@ -112,27 +114,30 @@ void ImageSource::run_commands(Clock::time_point first_trigger) {
   const bool by_rate = driver.trigger == CameraDriver::kSoftware && driver.rate_hz > 0;
   const auto period = std::chrono::nanoseconds(by_rate ? nanoseconds(1 / driver.rate_hz) : 0);
   Clock::time_point next = by_rate ? first_trigger : Clock::time_point::max();
+  std::int64_t number = 0;
   for (;;) {
     std::optional<ExposureSettings> exposure;
-    int triggers = 0;
+    std::deque<std::int64_t> triggers;
     {
       std::unique_lock lock(mutex_);
-      const auto wanted = [this] { return stop_ || pending_exposure_ || pending_triggers_ > 0; };
-      if (by_rate) stop_changed_.wait_until(lock, next, wanted);
-      else stop_changed_.wait(lock, wanted);
+      const auto wanted = [this] { return stop_ || pending_exposure_ || !pending_triggers_.empty(); };
+      if (by_rate)
+        stop_changed_.wait_until(lock, next, wanted);
+      else
+        stop_changed_.wait(lock, wanted);
       if (stop_) return;
       std::swap(exposure, pending_exposure_);
       std::swap(triggers, pending_triggers_);
     }
     if (by_rate && Clock::now() >= next) {
-      ++triggers;
       // After a pause of the process: no burst of triggers for the times that have passed.
-      while (next <= Clock::now()) next += period;
+      for (; next <= Clock::now(); next += period) ++number;
+      triggers.push_back(number);
     }
     const auto device = this->device();
     if (!device) continue;
     if (exposure) report(device->set_exposure(*exposure));
-    for (; triggers > 0; --triggers) report(send_trigger(*device));
+    for (const std::int64_t trigger : triggers) report(send_trigger(*device, trigger));
   }
 }
 
@@ -142,18 +147,19 @@ void ImageSource::report(const Status& status) {
   refused_ = !status;
 }
 
-Status ImageSource::send_trigger(CameraDevice& device) {
+Status ImageSource::send_trigger(CameraDevice& device, std::int64_t number) {
   const Stamp now = host_.now();
   {
     // Before the trigger, so that an image which comes at once finds it.
     const std::lock_guard lock(mutex_);
-    open_triggers_.push_back(now);
+    open_triggers_.push_back({number, now});
     ++counts_[0].triggers;
   }
   const Status triggered = device.trigger();
   if (triggered) return {};
   const std::lock_guard lock(mutex_);
-  const auto open = std::find(open_triggers_.begin(), open_triggers_.end(), now);
+  const auto open = std::find_if(open_triggers_.begin(), open_triggers_.end(),
+                                 [&](const Trigger& trigger) { return trigger.number == number; });
   if (open != open_triggers_.end()) {
     open_triggers_.erase(open);
     ++counts_[0].unanswered;
@@ -162,22 +168,26 @@ Status ImageSource::send_trigger(CameraDevice& device) {
 }
 
 // The image belongs to the trigger that is nearest to its stamp, of those before its arrival; earlier ones have none.
-void ImageSource::answer_trigger(SourceCounts& counts, Stamp stamp, Stamp arrival) {
-  const auto end = std::find_if(open_triggers_.begin(), open_triggers_.end(), [&](Stamp t) { return t > arrival; });
-  const auto answered = std::min_element(open_triggers_.begin(), end, [&](Stamp a, Stamp b) {
-    return std::abs(seconds_between(stamp, a)) < std::abs(seconds_between(stamp, b));
+// The number of the trigger; −1: none.
+std::int64_t ImageSource::answer_trigger(SourceCounts& counts, Stamp stamp, Stamp arrival) {
+  const auto end = std::find_if(open_triggers_.begin(), open_triggers_.end(),
+                                [&](const Trigger& trigger) { return trigger.time > arrival; });
+  const auto answered = std::min_element(open_triggers_.begin(), end, [&](const Trigger& a, const Trigger& b) {
+    return std::abs(seconds_between(stamp, a.time)) < std::abs(seconds_between(stamp, b.time));
   });
   if (answered == end) {
     counts.untriggered += request_.driver().trigger == CameraDriver::kSoftware;
-    return;
+    return -1;
   }
+  const std::int64_t number = answered->number;
   counts.unanswered += answered - open_triggers_.begin();
   open_triggers_.erase(open_triggers_.begin(), answered + 1);
+  return number;
 }
 
 void ImageSource::give_up_triggers() {
   const std::lock_guard lock(mutex_);
-  while (!open_triggers_.empty() && seconds_between(open_triggers_.front(), host_.now()) > kAnswer_s) {
+  while (!open_triggers_.empty() && seconds_between(open_triggers_.front().time, host_.now()) > kAnswer_s) {
     open_triggers_.pop_front();
     ++counts_[0].unanswered;
   }
@@ -197,8 +207,8 @@ void ImageSource::run() {
     } else if (read.state == DeviceRead::State::end) {
       break;
     } else if (read.state == DeviceRead::State::lost) {
-      log_.error(fmt::format("camera {} ({}): {}; trying again", request_.names(), request_.driver().source,
-                             read.reason));
+      log_.error(
+          fmt::format("camera {} ({}): {}; trying again", request_.names(), request_.driver().source, read.reason));
       const std::lock_guard lock(mutex_);
       device_ = nullptr;
       ++counts_[0].losses;
@@ -232,7 +242,7 @@ void ImageSource::deliver(CameraImage image) {
     const std::lock_guard lock(mutex_);
     SourceCounts& counts = counts_[static_cast<std::size_t>(side)];
     if (fresh) ++(stamped.image.image.empty() ? counts.incomplete : counts.images);
-    if (fresh) answer_trigger(counts, stamped.stamp, host_.stamp_of(stamped.image.complete));
+    if (fresh) stamped.trigger = answer_trigger(counts, stamped.stamp, host_.stamp_of(stamped.image.complete));
     if (!stamped.trusted) ++counts.wrong_stamps;
     counts.clock_sigma_s = stamped.sigma_s;
     counts.clock_rate = clocks_[static_cast<std::size_t>(side)].rate();

@@ -49,15 +49,15 @@ class HostClock {
 
 /// What one camera of a device has delivered so far. Triggers and losses count for the first one.
 struct SourceCounts {
-  std::int64_t images = 0;        ///< those that are complete
-  std::int64_t incomplete = 0;    ///< packets of them are missing
-  std::int64_t not_received = 0;  ///< left out in the count of the camera
+  std::int64_t images = 0;                    ///< those that are complete
+  std::int64_t incomplete = 0;                ///< packets of them are missing
+  std::int64_t not_received = 0;              ///< left out in the count of the camera
   std::int64_t duplicates = 0, reversed = 0;  ///< discarded: the same image again; an earlier one
   std::int64_t wrong_stamps = 0;
-  std::int64_t triggers = 0;    ///< sent
-  std::int64_t unanswered = 0;  ///< triggers without an image
+  std::int64_t triggers = 0;     ///< sent
+  std::int64_t unanswered = 0;   ///< triggers without an image
   std::int64_t untriggered = 0;  ///< images without a trigger, or later than kAnswer_s, of a camera that is triggered
-  std::int64_t losses = 0;    ///< how often the camera no longer answered
+  std::int64_t losses = 0;       ///< how often the camera no longer answered
   double clock_sigma_s = 0, clock_rate = 1;
 };
 
@@ -85,14 +85,16 @@ class ImageSource {
   bool waits() const { return waits_; }
   /// They return at once; what the camera refuses is logged. Codes: `read_error` (the camera does not answer now; an
   /// exposure is set when it does), `configuration` (it cannot be controlled).
-  Status trigger();
+  /// `number`: of the trigger, the same for both cameras of a pair, from kFirstCommanded on.
+  Status trigger(std::int64_t number);
   Status set_exposure(const ExposureSettings& settings);
   /// Of a camera of the request.
   SourceCounts counts(std::size_t side) const;
   const DeviceRequest& request() const { return request_; }
 
   static constexpr std::chrono::milliseconds kRetry{1000}, kPoll{50};
-  static constexpr double kAnswer_s = 1;  ///< within which an image follows its trigger
+  static constexpr std::int64_t kFirstCommanded = std::int64_t{1} << 40;  ///< those by rate count from 0
+  static constexpr double kAnswer_s = 1;                                  ///< within which an image follows its trigger
 
  private:
   ImageSource(DeviceRequest request, OpenDevice open, const HostClock& clock, const Log& log);
@@ -100,11 +102,11 @@ class ImageSource {
   void reopen();
   Status command(const std::function<void()>& note);
   void run_commands(std::chrono::steady_clock::time_point first_trigger);
-  Status send_trigger(CameraDevice& device);
+  Status send_trigger(CameraDevice& device, std::int64_t number);
   void report(const Status& status);
   void deliver(CameraImage image);
   bool is_new(const CameraImage& image);
-  void answer_trigger(SourceCounts& counts, Stamp stamp, Stamp arrival);
+  std::int64_t answer_trigger(SourceCounts& counts, Stamp stamp, Stamp arrival);
   void give_up_triggers();
   StampedImage stamped(CameraImage image);
   std::shared_ptr<CameraDevice> device() const;
@@ -122,9 +124,13 @@ class ImageSource {
   std::condition_variable stop_changed_;
   std::shared_ptr<CameraDevice> device_;  // null: lost
   std::optional<ExposureSettings> exposure_, pending_exposure_;
-  int pending_triggers_ = 0;
-  std::array<SourceCounts, 2> counts_;  // by side
-  std::deque<Stamp> open_triggers_;  // not answered yet
+  std::deque<std::int64_t> pending_triggers_;  // their numbers
+  std::array<SourceCounts, 2> counts_;         // by side
+  struct Trigger {
+    std::int64_t number = 0;
+    Stamp time;
+  };
+  std::deque<Trigger> open_triggers_;  // not answered yet
   bool stop_ = false;
   std::atomic<bool> ended_ = false;
 

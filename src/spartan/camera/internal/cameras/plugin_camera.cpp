@@ -130,12 +130,17 @@ CameraImage PluginCamera::image_of(const SpartanCameraImage& image) const {
   out.gain = image.gain;
   std::shared_ptr<const void> owner(image.token, plugin_.release);
   if (image.pixels == nullptr) return out;
-  const PixelFormat& format = formats_[std::min<std::size_t>(static_cast<std::size_t>(image.side), formats_.size() - 1)];
+  const PixelFormat& format =
+      formats_[std::min<std::size_t>(static_cast<std::size_t>(image.side), formats_.size() - 1)];
   const bool colour = image.channels == 3, wide = image.bytes_per_sample == 2;
-  if (colour && wide) out.image = shared_image<Rgb16>(image, std::move(owner), format);
-  else if (colour) out.image = shared_image<Rgb8>(image, std::move(owner), format);
-  else if (wide) out.image = shared_image<std::uint16_t>(image, std::move(owner), format);
-  else out.image = shared_image<std::uint8_t>(image, std::move(owner), format);
+  if (colour && wide)
+    out.image = shared_image<Rgb16>(image, std::move(owner), format);
+  else if (colour)
+    out.image = shared_image<Rgb8>(image, std::move(owner), format);
+  else if (wide)
+    out.image = shared_image<std::uint16_t>(image, std::move(owner), format);
+  else
+    out.image = shared_image<std::uint8_t>(image, std::move(owner), format);
   return out;
 }
 
@@ -145,8 +150,9 @@ Result<std::unique_ptr<CameraDevice>> open_plugin_camera(const DeviceRequest& re
   const std::string& source = request.driver().source;
   const bool aravis = source.starts_with(kAravis);
   if (!aravis && !source.starts_with(kGStreamer)) {
-    return failure(ErrorCode::configuration, fmt::format("source '{}' of camera {} is of no known kind", source, request.names()),
-                   "", "use aravis:ID or gst:PIPELINE");
+    return failure(ErrorCode::configuration,
+                   fmt::format("source '{}' of camera {} is of no known kind", source, request.names()), "",
+                   "use aravis:ID or gst:PIPELINE");
   }
   const auto plugin = load_camera_plugin(aravis);
   if (!plugin) return failure(plugin);

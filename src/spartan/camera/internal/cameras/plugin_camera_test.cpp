@@ -23,9 +23,9 @@ using ::testing::HasSubstr;
 constexpr int kWidth = 66, kHeight = 48;  // a line is no multiple of four bytes
 
 std::string rig_text(const std::string& pixels) {
-  const std::string camera = fmt::format(
-      "size_px: [{}, {}], model: pinhole, focal_px: [50, 50], centre_px: [32.5, 23.5], axes: optical, {}", kWidth,
-      kHeight, pixels);
+  const std::string camera =
+      fmt::format("size_px: [{}, {}], model: pinhole, focal_px: [50, 50], centre_px: [32.5, 23.5], axes: optical, {}",
+                  kWidth, kHeight, pixels);
   return fmt::format(
       "schema: 1\ncameras:\n  l: {{{0} translation_m: [0, 0, 0]}}\n  r: {{{0} translation_m: [0.1, 0, 0]}}\n"
       "pairs:\n  p: {{left: l, right: r}}\n",
@@ -36,7 +36,8 @@ std::string rig_text(const std::string& pixels) {
 Image<std::uint8_t> pattern(int number, int side) {
   Image<std::uint8_t> image(kWidth, kHeight);
   for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) image(x, y) = static_cast<std::uint8_t>((x * 3 + y * 7 + number * 31 + side * 101) % 256);
+    for (int x = 0; x < kWidth; ++x)
+      image(x, y) = static_cast<std::uint8_t>((x * 3 + y * 7 + number * 31 + side * 101) % 256);
   }
   return image;
 }
@@ -56,8 +57,9 @@ class Pipelines : public ::testing::Test {
 
   // A source of GStreamer that shows the images of a side at 100 Hz.
   std::string images_of(int side) const {
-    return fmt::format("multifilesrc location={}/{}/%03d.png stop-index={} caps=image/png,framerate=100/1 ! pngdec ! videoconvert",
-                       folder.path(), side, kImages - 1);
+    return fmt::format(
+        "multifilesrc location={}/{}/%03d.png stop-index={} caps=image/png,framerate=100/1 ! pngdec ! videoconvert",
+        folder.path(), side, kImages - 1);
   }
 
   Result<std::unique_ptr<SampleStream>> open(const std::string& pipeline, const std::string& pixels = "") {
@@ -68,7 +70,8 @@ class Pipelines : public ::testing::Test {
   }
 
   static bool is_missing(const Result<std::unique_ptr<SampleStream>>& stream) {
-    return !stream && (stream.error().code == ErrorCode::configuration || stream.error().what.find("no element") != std::string::npos);
+    return !stream && (stream.error().code == ErrorCode::configuration ||
+                       stream.error().what.find("no element") != std::string::npos);
   }
 
   // All frames of the stream.
@@ -116,9 +119,10 @@ TEST_F(Pipelines, TwoSinksDeliverEveryImageOfAFileUnchanged) {
 }
 
 TEST_F(Pipelines, ASideBySideImageIsCutInTwo) {
-  auto stream = open(fmt::format("compositor name=both sink_1::xpos={} ! video/x-raw,format=AYUV ! videoconvert ! "
-                                 "appsink name=left {} ! both.sink_0 {} ! both.sink_1",
-                                 kWidth, images_of(0), images_of(1)));
+  auto stream =
+      open(fmt::format("compositor name=both sink_1::xpos={} ! video/x-raw,format=AYUV ! videoconvert ! "
+                       "appsink name=left {} ! both.sink_0 {} ! both.sink_1",
+                       kWidth, images_of(0), images_of(1)));
   if (is_missing(stream)) GTEST_SKIP() << stream.error().message();
   ASSERT_TRUE(stream) << stream.error().message();
   const auto frames = frames_of(**stream);
