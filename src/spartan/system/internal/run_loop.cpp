@@ -310,8 +310,19 @@ Status RunLoop::record(RunResult result) {
   if (frames_ == 1 || since.count() >= options.state_every_s) add_checkpoint(result);
   Status status = recorder_->add(std::move(result));
   pipeline_.map_changes_stored(recorder_->maps_stored());
+  report_disk();
   if (status && hooks_.progress) hooks_.progress(progress);
   return status;
+}
+
+void RunLoop::report_disk() {
+  const auto error = recorder_->disk_error();
+  if (error.has_value() == disk_failed_) return;
+  disk_failed_ = error.has_value();
+  if (error)
+    hooks_.log.error("results wait in memory, their commit is tried again: " + error->message());
+  else
+    hooks_.log.warning("the disk can be written to again: all results are committed");
 }
 
 void RunLoop::report_estimate() {

@@ -96,6 +96,7 @@ class RunLoop {
   Status record(RunResult result);
   void add_checkpoint(RunResult& result);
   void report_estimate();
+  void report_disk();
   std::vector<StageTime> take_stage_times();
 
   const RunRequest& request_;
@@ -126,6 +127,7 @@ class RunLoop {
   std::string first_error_;
   std::chrono::steady_clock::time_point arrived_;  // of the sample that is processed
   LatencyRecord latencies_;
+  bool disk_failed_ = false;
   bool after_frame_ = true;  // nothing was processed since the last frame of the odometry pair
   bool stopped_ = false;
   bool catching_up_ = false;  // with what a resumed live run had recorded

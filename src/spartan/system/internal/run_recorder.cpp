@@ -1,5 +1,6 @@
 #include "spartan/system/internal/run_recorder.h"
 
+#include <algorithm>
 #include <ctime>
 #include <utility>
 
@@ -91,10 +92,16 @@ Status RunRecorder::flush() {
   flushing_ = true;
   changed_.notify_all();
   if (thread_.joinable()) {
-    changed_.wait(lock, [this] { return !status_ || (waiting_.empty() && !busy_ && batch_.empty()); });
+    changed_.wait(
+        lock, [this] { return !status_ || (waiting_.empty() && !busy_ && batch_.empty() && transactions_.empty()); });
   }
   flushing_ = false;
   return status_;
+}
+
+std::optional<Error> RunRecorder::disk_error() const {
+  const Lock lock(mutex_);
+  return disk_error_;
 }
 
 std::uint64_t RunRecorder::maps_stored() const {
@@ -111,14 +118,22 @@ std::chrono::steady_clock::time_point RunRecorder::commit_time() const {
   return oldest_ + seconds(options_.every_s);
 }
 
+// When there is something to do without another result.
+std::chrono::steady_clock::time_point RunRecorder::wake_time() const {
+  const auto never = std::chrono::steady_clock::time_point::max();
+  return std::min(batch_.empty() ? never : commit_time(), transactions_.empty() ? never : retry_);
+}
+
 void RunRecorder::run() {
   Lock lock(mutex_);
   for (;;) {
-    const auto has_work = [this] { return ended_ || !waiting_.empty() || (flushing_ && !batch_.empty()); };
-    if (batch_.empty()) {
+    const auto has_work = [this] {
+      return ended_ || !waiting_.empty() || (flushing_ && !(batch_.empty() && transactions_.empty()));
+    };
+    if (batch_.empty() && transactions_.empty()) {
       changed_.wait(lock, has_work);
     } else {
-      changed_.wait_until(lock, commit_time(), has_work);
+      changed_.wait_until(lock, wake_time(), has_work);
     }
     if (ended_ || !status_) return;
     std::optional<RunResult> next;
@@ -131,7 +146,7 @@ void RunRecorder::run() {
     lock.unlock();
     Status status;
     try {
-      status = next ? process(std::move(*next)) : commit({}, {});
+      status = next ? process(std::move(*next)) : commit({}, {});  // also where a retry is due
     } catch (const std::bad_alloc& exception) {
       status = tl::unexpected(out_of_memory(exception));
     }
@@ -143,12 +158,18 @@ void RunRecorder::run() {
 }
 
 Status RunRecorder::process(RunResult result) {
-  if (Status written = write_files(result); !written) return written;
+  if (Status written = write_files(result); !written) {
+    if (!may_wait_for_disk(written)) return written;
+    note_disk(written);
+    if (result.stop && !result.step.map) result.step.map = record_of(*result.stop);
+    const Lock lock(mutex_);
+    statistics_.files_discarded += static_cast<std::int64_t>(files_of(result));
+  }
   if (batch_.empty()) oldest_ = std::chrono::steady_clock::now();
   batch_.push_back(std::move(result.step));
   const bool due = result.checkpoint || result.commit_now || std::chrono::steady_clock::now() >= commit_time();
   if (result.checkpoint && result.before_checkpoint) result.before_checkpoint();
-  return due ? commit(result.checkpoint, result.maps) : Status();
+  return due ? commit(std::move(result.checkpoint), std::move(result.maps)) : Status();
 }
 
 Status RunRecorder::write_files(RunResult& result) {
@@ -174,15 +195,51 @@ Status RunRecorder::write_files(RunResult& result) {
   return {};
 }
 
-Status RunRecorder::commit(const std::optional<RunStore::Checkpoint>& checkpoint, const MapChanges& maps) {
+// Whether the rover goes on without it.
+bool RunRecorder::may_wait_for_disk(const Status& status) const {
+  const bool of_disk = status.error().code == ErrorCode::output || status.error().code == ErrorCode::resources;
+  return pace_ == Pace::live && of_disk && uncommitted_ + batch_.size() < kMostUncommitted;
+}
+
+void RunRecorder::note_disk(const Status& status) {
+  const Lock lock(mutex_);
+  disk_error_ = status ? std::optional<Error>() : status.error();
+}
+
+Status RunRecorder::commit(std::optional<RunStore::Checkpoint> checkpoint, MapChanges maps) {
+  if (!batch_.empty() || checkpoint) {
+    uncommitted_ += batch_.size();
+    transactions_.push_back({std::move(batch_), std::move(checkpoint), std::move(maps)});
+    batch_.clear();
+  }
+  bool flushing = false;
+  {
+    const Lock lock(mutex_);
+    flushing = flushing_;
+  }
+  const bool waits = transactions_.size() > 1 && std::chrono::steady_clock::now() < retry_;
+  if (waits && !flushing) return {};
+  const Status committed = commit_transactions();
+  if (committed || flushing || !may_wait_for_disk(committed)) return committed;
+  note_disk(committed);
+  retry_ = std::chrono::steady_clock::now() + kRetry;
+  return {};
+}
+
+// In their order, until one fails.
+Status RunRecorder::commit_transactions() {
   StageClock clock(CLOCK_THREAD_CPUTIME_ID);
   clock.show_in(running_);
-  Status committed = clock.measure("commit", [&] { return store_.commit(batch_, checkpoint, maps); });
-  if (!committed) return committed;
-  const Lock lock(mutex_);
-  batch_.clear();
-  if (checkpoint) maps_stored_ = maps.number;
-  statistics_.commits.push_back(clock.take().front());
+  for (; !transactions_.empty(); transactions_.pop_front()) {
+    const Transaction& next = transactions_.front();
+    Status committed = clock.measure("commit", [&] { return store_.commit(next.steps, next.checkpoint, next.maps); });
+    if (!committed) return committed;
+    uncommitted_ -= next.steps.size();
+    const Lock lock(mutex_);
+    if (next.checkpoint) maps_stored_ = next.maps.number;
+    statistics_.commits.push_back(clock.take().front());
+    disk_error_.reset();
+  }
   return {};
 }
 

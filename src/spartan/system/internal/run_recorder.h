@@ -41,8 +41,12 @@ struct RecorderStatistics {
   std::int64_t files_discarded = 0;  ///< terrain views and local maps whose files were not written (Pace::live)
 };
 
-/// Results are committed in their order, many in one transaction (CommitOptions). Pace::recorded: add() waits where too
-/// many results wait for the disk. Pace::live: it never waits; files of terrain views and maps are then not written.
+/// Results are committed in their order, many in one transaction (CommitOptions).
+///
+/// Pace::recorded: add() waits where too many results wait for the disk, and an error of the disk ends the run.
+/// Pace::live: add() never waits; files of terrain views and maps are then not written. Where the disk cannot be
+/// written to, as a full one, results wait in memory, their commit is tried again each kRetry, and the rover goes on;
+/// only where kMostUncommitted wait is it an error.
 class RunRecorder {
  public:
   /// Opens a second connection to the store, for reading map tiles. Codes: `output`, `store_damaged`, `resources`.
@@ -55,8 +59,10 @@ class RunRecorder {
 
   /// An error is that of an earlier result; no result after it is written. Codes: `output`, `resources`.
   Status add(RunResult result);
-  /// Returns when all results are committed. Codes as add().
+  /// Returns when all results are committed. Codes as add(): an error of the disk now.
   Status flush();
+  /// Why results cannot be committed now, and are tried again.
+  std::optional<Error> disk_error() const;
   /// Number of the latest changes of the map that are committed.
   std::uint64_t maps_stored() const;
 
@@ -68,8 +74,10 @@ class RunRecorder {
   /// What its thread does now.
   const RunningStage& running() const { return running_; }
 
-  static constexpr std::size_t kMostFiles = 8;      ///< terrain views and maps that may wait
-  static constexpr std::size_t kMostResults = 512;  ///< results that may wait (Pace::recorded)
+  static constexpr std::size_t kMostFiles = 8;             ///< terrain views and maps that may wait
+  static constexpr std::size_t kMostResults = 512;         ///< results that may wait (Pace::recorded)
+  static constexpr std::size_t kMostUncommitted = 18'000;  ///< results in memory (Pace::live): half an hour at 10 Hz
+  static constexpr std::chrono::seconds kRetry{2};
 
  private:
   using Lock = std::unique_lock<std::mutex>;
@@ -78,7 +86,11 @@ class RunRecorder {
   void run();
   Status process(RunResult result);
   Status write_files(RunResult& result);
-  Status commit(const std::optional<RunStore::Checkpoint>& checkpoint, const MapChanges& maps);
+  Status commit(std::optional<RunStore::Checkpoint> checkpoint, MapChanges maps);
+  Status commit_transactions();
+  bool may_wait_for_disk(const Status& status) const;
+  void note_disk(const Status& status);
+  std::chrono::steady_clock::time_point wake_time() const;
   std::chrono::steady_clock::time_point commit_time() const;
   static std::size_t files_of(const RunResult& result) { return (result.terrain ? 1U : 0U) + (result.stop ? 1U : 0U); }
 
@@ -90,7 +102,17 @@ class RunRecorder {
   CommitOptions options_;
   Pace pace_;
 
-  // Of the thread.
+  // What is to be committed together.
+  struct Transaction {
+    std::vector<RunStore::Step> steps;
+    std::optional<RunStore::Checkpoint> checkpoint;
+    MapChanges maps;
+  };
+
+  // Of the thread, and read by flush() while it is not busy.
+  std::deque<Transaction> transactions_;  // more than one where the disk cannot be written to
+  std::size_t uncommitted_ = 0;           // steps in them
+  std::chrono::steady_clock::time_point retry_;
   std::vector<RunStore::Step> batch_;
   std::chrono::steady_clock::time_point oldest_;  // of the batch
 
@@ -101,6 +123,7 @@ class RunRecorder {
   std::size_t files_waiting_ = 0;
   bool busy_ = false, flushing_ = false, ended_ = false;
   Status status_;
+  std::optional<Error> disk_error_;
   std::uint64_t maps_stored_ = 0;
   RecorderStatistics statistics_;
   std::thread thread_;

@@ -1,8 +1,10 @@
 #include "spartan/system/internal/run_recorder.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -132,6 +134,68 @@ TEST_F(RunRecorderTest, DiscardsOnlyFilesAndOnlyLive) {
     EXPECT_EQ(written + recorder->statistics().files_discarded, kResults);
     EXPECT_TRUE(pace == Pace::live || written == kResults) << written;
   }
+}
+
+// No file can be written to while it lives.
+class FullDisk {
+ public:
+  FullDisk() {
+    ::getrlimit(RLIMIT_FSIZE, &before_);
+    handler_ = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit none{0, before_.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &none);
+  }
+  ~FullDisk() {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int) = nullptr;
+};
+
+TEST_F(RunRecorderTest, LiveResultsWaitForADiskThatIsFull) {
+  CommitOptions soon;
+  soon.every_s = 0.01;
+  const auto recorder = open(soon, Pace::live);
+  ASSERT_TRUE(recorder->add(frame_result(0)));
+  ASSERT_TRUE(recorder->flush());
+  {
+    const FullDisk full;
+    for (int i = 1; i < 30; ++i) {
+      RunResult result = i == 20 ? terrain_result(i) : frame_result(i);
+      if (i == 15) {
+        result.checkpoint = RunStore::Checkpoint{{4, 5}, {5, 6}};
+        result.maps.number = 9;
+      }
+      ASSERT_TRUE(recorder->add(std::move(result))) << "the rover goes on";
+      std::this_thread::sleep_for(2ms);
+    }
+    for (int i = 0; i < 200 && !recorder->disk_error(); ++i) std::this_thread::sleep_for(10ms);
+    ASSERT_TRUE(recorder->disk_error());
+    EXPECT_EQ(recorder->maps_stored(), 0U);
+  }
+  // The next try comes by itself.
+  for (int i = 0; i < 1000 && recorder->disk_error(); ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_FALSE(recorder->disk_error());
+  ASSERT_TRUE(recorder->add(frame_result(30)));
+  ASSERT_TRUE(recorder->flush());
+  EXPECT_EQ(committed_frames(), 31U);
+  EXPECT_EQ(recorder->maps_stored(), 9U);
+  EXPECT_EQ((*recorder->store().checkpoint())->pipeline_state, (Bytes{4, 5}));
+  EXPECT_EQ(recorder->statistics().files_discarded, 1) << "those of a terrain view";
+}
+
+TEST_F(RunRecorderTest, AtTheEndAFullDiskIsAnError) {
+  const auto recorder = open({}, Pace::live);
+  ASSERT_TRUE(recorder->add(frame_result(0)));
+  const FullDisk full;
+  const Status flushed = recorder->flush();
+  ASSERT_FALSE(flushed);
+  EXPECT_EQ(flushed.error().code, ErrorCode::output);
 }
 
 TEST_F(RunRecorderTest, ReportsAnErrorOfTheDisk) {
