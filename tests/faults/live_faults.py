@@ -62,13 +62,16 @@ def live_power_loss(lab, trials):
         found = frames_in(folder)
         durable = max((frames for at, frames in trace.durable_frames.items() if at <= end), default=0)
         problems = [f"{found} frames in the store, {durable} were durable"] if found < durable else []
+        lost = attempt % 4 == 3  # and the recording with it
+        if lost:
+            shutil.rmtree(folder / "live", ignore_errors=True)
         done = lab.run(*lab.run_command(trace.live, folder, "--resume"))
         problems += [f"resume: {problem}" for problem in done.problems({trace.live.code})]
         problems += recorded_problems(lab, folder)  # the resume has finished the recording of the interrupted run
         if not problems and (folder / ODOMETRY).read_bytes() != trace.trajectory:
             problems.append("the odometry differs from that of an undisturbed run")
         yield judge(problems, f"live, {'journal' if journal else 'posix'}, change {end} of {len(trace.changes)}, "
-                              f"{share:.0%} of what was not synced survives")
+                              f"{share:.0%} of what was not synced survives{', the recording is lost' if lost else ''}")
         shutil.rmtree(folder, ignore_errors=True)
 
 

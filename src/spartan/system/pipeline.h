@@ -130,6 +130,8 @@ class Pipeline {
   /// this order, before the next frame is added.
   std::vector<FrameKey> pending_frames() const;
   Status restore_frame(const StereoFrame& frame);
+  /// Instead, where their images are lost: no map and no terrain view is made of them.
+  void abandon_pending_frames();
 
   /// By all sensors, at the newest sample, e.g. after each one of the IMU. None before the first frame, and in a run by
   /// odometry alone.

@@ -186,6 +186,25 @@ TEST(PipelineMaps, StopContinuesFromRestoredState) {
   }
 }
 
+// The images of its views are lost.
+TEST(PipelineMaps, AStopCanBeAbandonedAfterRestoring) {
+  Pipeline saved = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(1)).value(),
+           resumed = Pipeline::create(mapping_rover(), without_delay(), ThreadPool(1)).value();
+  drive_to(saved, 0);
+  add_wide_view(saved, 0);
+  ASSERT_TRUE(saved.add(frame_of(images_of("narrow", 0), "narrow", 0, 1.5)).value().has_value());
+  const testing::TemporaryFolder folder;
+  Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
+  TileStore tiles = TileStore::open(db).value();
+  ASSERT_TRUE(resumed.restore(saved.save(), tiles));
+  ASSERT_EQ(resumed.pending_frames().size(), 2);
+  resumed.abandon_pending_frames();
+  EXPECT_TRUE(resumed.pending_frames().empty());
+  EXPECT_FALSE(drive_to(resumed, 1).stop) << "no map of the stop";
+  add_wide_view(resumed, 1);
+  EXPECT_TRUE(drive_to(resumed, 2).stop) << "one of the next";
+}
+
 void expect_same_map(const LocalMap& a, const LocalMap& b) {
   ASSERT_EQ(a.size(), b.size());
   int known = 0;

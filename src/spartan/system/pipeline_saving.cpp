@@ -104,6 +104,13 @@ std::vector<FrameKey> Pipeline::pending_frames() const {
   return pending;
 }
 
+void Pipeline::abandon_pending_frames() {
+  State& s = *state_;
+  if (s.terrain_stage.pending_frame()) s.terrain_stage.abandon_frame();
+  if (s.keyframe_stage.pending_frame()) s.keyframe_stage.clear();
+  s.stop_stage.abandon_pending_frames();
+}
+
 Status Pipeline::restore_frame(const StereoFrame& frame) {
   State& s = *state_;
   const StereoPair* const pair = s.rig.find_pair(frame.pair);

@@ -65,16 +65,32 @@ Status RunLoop::begin() {
   if (!so_far.empty()) last_position_ = so_far.back().pose.translation();
   for (const FrameRecord& frame : *frames) usable_frames_ += frame.status != "missing";
   if (Status status = pipeline_.restore((*checkpoint)->pipeline_state, recorder_->tiles()); !status) return status;
-  for (const FrameKey& key : pipeline_.pending_frames()) {
-    const auto frame = frame_at(key);
-    if (!frame) return failure(frame);
-    if (Status status = pipeline_.restore_frame(*frame); !status) return status;
-  }
+  if (Status status = restore_pending_frames(); !status) return status;
   samples_taken_ = (*checkpoint)->source.samples_taken;
   elapsed_before_ = (*checkpoint)->elapsed;
   resumed_ = true;
   hooks_.log.info(fmt::format("resuming after frame {}", frames->back().frame_id));
   return seek(**checkpoint);
+}
+
+// Of a live run the frames may not have been recorded: with a disk that was full, or without a recording.
+Status RunLoop::restore_pending_frames() {
+  std::vector<StereoFrame> frames;
+  for (const FrameKey& key : pipeline_.pending_frames()) {
+    auto frame = frame_at(key);
+    if (!frame && !recording_ && frame.error().code == ErrorCode::input) {
+      hooks_.log.warning(fmt::format("what was to be made of the last views of the interrupted run is lost: {}",
+                                     frame.error().message()));
+      pipeline_.abandon_pending_frames();
+      return {};
+    }
+    if (!frame) return failure(frame);
+    frames.push_back(std::move(*frame));
+  }
+  for (const StereoFrame& frame : frames) {
+    if (Status status = pipeline_.restore_frame(frame); !status) return status;
+  }
+  return {};
 }
 
 Result<StereoFrame> RunLoop::frame_at(const FrameKey& key) {

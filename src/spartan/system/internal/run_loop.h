@@ -83,6 +83,7 @@ class RunLoop {
   Status process_until_end();
   Result<StreamRead> read();
   Status seek(const RunStore::Checkpoint& checkpoint);
+  Status restore_pending_frames();
   Result<StereoFrame> frame_at(const FrameKey& key);
   Status process(const Sample& sample);
   /// Whether the run is to end.

@@ -156,6 +156,11 @@ Status StopStage::restore_view(const std::string& pair, const RectifiedPair& fra
   return {};
 }
 
+void StopStage::abandon_pending_frames() {
+  std::erase_if(stops_, [](const Stop& stop) { return stop.first_frame_is_pending || !stop.pending.empty(); });
+  pending_early_.clear();
+}
+
 void StopStage::save(ArchiveWriter& out) const {
   const auto put_keys = [&out](const std::vector<FrameKey>& keys) {
     std::vector<std::int64_t> stamps;

@@ -96,6 +96,8 @@ class StopStage {
   void restore_first_frame(const RectifiedPair& frame, double nearest_m);
   Status restore_view(const std::string& pair, const RectifiedPair& frame, double nearest_m, std::int64_t position_id,
                       BackEnd& back_end);
+  /// Instead: the stops that they belong to are discarded.
+  void abandon_pending_frames();
 
   void save(ArchiveWriter& out) const;
   void restore(ArchiveReader& in);

@@ -46,6 +46,8 @@ class TerrainStage {
   /// After restore(): the stamp of the pending view, to be passed to restore_frame().
   std::optional<Stamp> pending_frame() const { return pending_ && !job_ ? std::optional(stamp_) : std::nullopt; }
   void restore_frame(const RectifiedPair& frame, double nearest_m, DisparityComputer& computer, BackEnd& back_end);
+  /// Instead: no view is made.
+  void abandon_frame() { pending_ = false; }
 
   void save(ArchiveWriter& out) const;
   void restore(ArchiveReader& in);
