@@ -17,6 +17,7 @@
 namespace {
 
 constexpr int kFirstBuffers = 8, kFewestFree = 3;
+constexpr unsigned kPacketWait_us = 60'000;
 
 // An error of Aravis, freed at the end of its scope.
 class CameraError {
@@ -142,6 +143,9 @@ bool start(GenicamCamera& device, const SpartanCameraSettings& settings, std::st
   if (failed(error, "payload", why)) return false;
   device.stream.reset(arv_camera_create_stream(camera, nullptr, nullptr, error.out()));
   if (failed(error, "stream", why) || !device.stream) return false;
+  // What has not come by then was lost; an image that waits for it longer would come after the next one.
+  if (ARV_IS_GV_STREAM(device.stream.get()))
+    g_object_set(device.stream.get(), "frame-retention", kPacketWait_us, nullptr);
   for (int i = 0; i < kFirstBuffers; ++i)
     arv_stream_push_buffer(device.stream.get(), arv_buffer_new_allocate(device.payload));
   g_signal_connect(arv_camera_get_device(camera), "control-lost", G_CALLBACK(control_lost), &device);

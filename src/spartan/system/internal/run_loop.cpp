@@ -124,7 +124,7 @@ Status RunLoop::process_samples() {
     const double limit_s = request_.watchdog_s;
     watchdog.emplace(std::vector<WatchedStage>{{&front_end_, limit_s},
                                                {&pipeline_.back_end_stage(), kBackEndPatience * limit_s},
-                                               {&recorder_->running(), limit_s}},
+                                               {&recorder_->running(), kBackEndPatience * limit_s}},
                      hooks_.hung);
   }
   const Status processed = process_until_end();
@@ -323,7 +323,8 @@ Status RunLoop::record(RunResult result) {
   result.commit_now = far || (options.at_maps && result.stop);
   if (far) distance_committed_m_ = distance_m_;
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - last_checkpoint_;
-  if (frames_ == 1 || since.count() >= options.state_every_s) add_checkpoint(result);
+  const bool due = since.count() >= options.state_every_s && (recording_ || !recorder_->checkpoint_waits());
+  if (frames_ == 1 || due) add_checkpoint(result);
   Status status = recorder_->add(std::move(result));
   pipeline_.map_changes_stored(recorder_->maps_stored());
   report_disk();

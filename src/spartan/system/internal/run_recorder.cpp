@@ -82,6 +82,7 @@ Status RunRecorder::add(RunResult result) {
   }
   if (!status_) return status_;
   files_waiting_ += files_of(result);
+  checkpoints_waiting_ += result.checkpoint ? 1 : 0;
   waiting_.push_back(std::move(result));
   changed_.notify_all();
   return {};
@@ -102,6 +103,11 @@ Status RunRecorder::flush() {
 std::optional<Error> RunRecorder::disk_error() const {
   const Lock lock(mutex_);
   return disk_error_;
+}
+
+bool RunRecorder::checkpoint_waits() const {
+  const Lock lock(mutex_);
+  return checkpoints_waiting_ > 0;
 }
 
 std::uint64_t RunRecorder::maps_stored() const {
@@ -236,7 +242,10 @@ Status RunRecorder::commit_transactions() {
     if (!committed) return committed;
     uncommitted_ -= next.steps.size();
     const Lock lock(mutex_);
-    if (next.checkpoint) maps_stored_ = next.maps.number;
+    if (next.checkpoint) {
+      maps_stored_ = next.maps.number;
+      --checkpoints_waiting_;
+    }
     statistics_.commits.push_back(clock.take().front());
     disk_error_.reset();
   }

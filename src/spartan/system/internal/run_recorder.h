@@ -63,6 +63,8 @@ class RunRecorder {
   Status flush();
   /// Why results cannot be committed now, and are tried again.
   std::optional<Error> disk_error() const;
+  /// Whether a checkpoint was added and is not committed yet. Another one would only keep a slow disk busy.
+  bool checkpoint_waits() const;
   /// Number of the latest changes of the map that are committed.
   std::uint64_t maps_stored() const;
 
@@ -125,6 +127,7 @@ class RunRecorder {
   Status status_;
   std::optional<Error> disk_error_;
   std::uint64_t maps_stored_ = 0;
+  std::int64_t checkpoints_waiting_ = 0;
   RecorderStatistics statistics_;
   std::thread thread_;
 };
