@@ -61,7 +61,6 @@ GenicamCamera::~GenicamCamera() {
   if (stream) {
     g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera.get()), this);
     if (!lost) arv_camera_stop_acquisition(camera.get(), nullptr);
-    arv_stream_stop_thread(stream.get(), FALSE);
   }
 }
 

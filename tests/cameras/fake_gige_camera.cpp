@@ -50,12 +50,19 @@ std::size_t index_now(const Scene& scene) {
 void fill(ArvBuffer* buffer, void* data, guint32, guint32, ArvPixelFormat) {
   const auto& scene = *static_cast<const Scene*>(data);
   const auto image = spartan::read_gray8(scene.files[index_now(scene)]);
-  if (!image) return;
-  std::size_t size = 0;
-  auto* const out = static_cast<std::uint8_t*>(const_cast<void*>(arv_buffer_get_data(buffer, &size)));
-  const auto width = static_cast<std::size_t>(image->width());
-  for (int y = 0; y < image->height() && (static_cast<std::size_t>(y) + 1) * width <= size; ++y)
-    std::memcpy(out + static_cast<std::size_t>(y) * width, &(*image)(0, y), width);
+  if (!image) {
+    std::fprintf(stderr, "%s\n", image.error().message().c_str());
+    std::abort();
+  }
+  auto* const out = static_cast<std::uint8_t*>(const_cast<void*>(arv_buffer_get_data(buffer, nullptr)));
+  const int width = std::min(image->width(), arv_buffer_get_image_width(buffer));
+  const int height = std::min(image->height(), arv_buffer_get_image_height(buffer));
+  for (int y = 0; y < height; ++y) {
+    std::memcpy(out + static_cast<std::ptrdiff_t>(y) * arv_buffer_get_image_width(buffer), &(*image)(0, y),
+                static_cast<std::size_t>(width));
+  }
+  // No two images of a sensor are equal.
+  out[0] = static_cast<std::uint8_t>(arv_buffer_get_frame_id(buffer));
 }
 
 }  // namespace

@@ -13,6 +13,9 @@ using Clock = std::chrono::steady_clock;
 
 // From the start of the threads to the first trigger.
 constexpr std::chrono::milliseconds kFirstTrigger{50};
+// A camera without an image for so long, and whose partner has delivered so many alone, is silent.
+constexpr std::chrono::seconds kSilence{1};
+constexpr int kAloneInRow = 3;
 
 bool has_driver(const Rig& rig, const std::string& camera) {
   return rig.find_camera(camera)->driver.has_value();
@@ -99,6 +102,7 @@ void CameraStream::add(Feed& feed, int side, StampedImage image) {
     feed.pairing.drop_oldest(side);
     ++feed.report.not_taken;
   }
+  feed.newest[side == 0 ? 0 : 1] = image.image.complete;
   feed.pairing.add(side, std::move(image));
   changed_.notify_all();
 }
@@ -187,12 +191,19 @@ Result<StreamRead> CameraStream::read(std::chrono::nanoseconds timeout) {
 
 void CameraStream::take_all(Clock::time_point now) {
   for (const auto& feed : feeds_) {
-    // A partner of a camera that does not answer is not waited for.
-    const bool lost =
-        std::any_of(feed->sources.begin(), feed->sources.end(), [](const auto& source) { return source->is_lost(); });
-    while (auto pair = feed->pairing.take(lost ? now + options_.pair_wait : now)) take_pair(*feed, std::move(*pair));
+    const bool alone = is_one_camera_silent(*feed, now);
+    while (auto pair = feed->pairing.take(alone ? now + options_.pair_wait : now)) take_pair(*feed, std::move(*pair));
   }
   changed_.notify_all();
+}
+
+// Whether one of the cameras no longer delivers, so that its images are not waited for.
+bool CameraStream::is_one_camera_silent(const Feed& feed, Clock::time_point now) {
+  const bool lost =
+      std::any_of(feed.sources.begin(), feed.sources.end(), [](const auto& source) { return source->is_lost(); });
+  const bool silent = std::any_of(feed.newest.begin(), feed.newest.end(),
+                                  [&](Clock::time_point newest) { return now - newest > kSilence; });
+  return lost || (silent && feed.alone_in_row >= kAloneInRow);
 }
 
 bool CameraStream::waits() const {
@@ -202,6 +213,7 @@ bool CameraStream::waits() const {
 }
 
 void CameraStream::take_pair(Feed& feed, ImagePair pair) {
+  feed.alone_in_row = pair.is_complete() ? 0 : feed.alone_in_row + 1;
   Clock::time_point complete = pair.first().image.complete;
   if (pair.is_complete()) complete = std::max(complete, pair.images[1]->image.complete);
   push(sample_of(feed, std::move(pair)), complete);

@@ -1,6 +1,7 @@
 // Cameras that run now, as a stream of stereo frames.
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -58,6 +59,8 @@ class CameraStream : public SampleStream, public CameraControl {
     StereoPair pair;
     std::vector<std::unique_ptr<ImageSource>> sources;
     ImagePairing pairing;
+    std::array<std::chrono::steady_clock::time_point, 2> newest;  // images, by side
+    int alone_in_row = 0;                                         // images, the newest ones
     std::optional<Stamp> last_stamp;
     CameraPairReport report;
     double skew_sum_ms = 0;
@@ -67,6 +70,7 @@ class CameraStream : public SampleStream, public CameraControl {
   Status open_pair(const StereoPair& pair, const OpenDevice& open);
   void start();
   void add(Feed& feed, int side, StampedImage image);
+  static bool is_one_camera_silent(const Feed& feed, std::chrono::steady_clock::time_point now);
   void take_all(std::chrono::steady_clock::time_point now);
   void take_pair(Feed& feed, ImagePair pair);
   Sample sample_of(Feed& feed, ImagePair pair);

@@ -225,6 +225,29 @@ TEST_F(CameraStreamTest, ACameraThatIsLostIsOpenedAgainWithItsExposure) {
   EXPECT_EQ((*stream)->camera_reports()[0].cameras[1].losses, 1);
 }
 
+TEST_F(CameraStreamTest, ASilentCameraIsNotWaitedForUntilItDeliversAgain) {
+  deliver(1);
+  auto stream = open(two_cameras());
+  ASSERT_TRUE(stream) << stream.error().message();
+  static_cast<void>((*stream)->read(milliseconds(1)));
+  const auto alone_after = [&](int id) {
+    const auto begin = Clock::now();
+    scripts["left"].add(image_read(id, 1));
+    EXPECT_TRUE(std::holds_alternative<MissingFrame>(next(**stream)));
+    return Clock::now() - begin;
+  };
+  for (int id = 2; id < 5; ++id) EXPECT_GE(alone_after(id), milliseconds(95)) << "the other one may come";
+  std::this_thread::sleep_for(milliseconds(1000));
+  // The shortest of several, for a machine that is busy.
+  auto shortest = alone_after(5);
+  for (int id = 6; id < 16; ++id) shortest = std::min(shortest, alone_after(id));
+  EXPECT_LT(shortest, milliseconds(95));
+  scripts["right"].add(image_read(16, 2));
+  EXPECT_EQ(std::get<MissingFrame>(next(**stream)).fault, FrameFault::left_missing);
+  deliver(17);
+  EXPECT_TRUE(std::holds_alternative<StereoFrame>(next(**stream)));
+}
+
 TEST_F(CameraStreamTest, TriggersAtARateAndAccountsForEach) {
   const Rig rig = two_cameras(CameraDriver::kSoftware, 50);
   deliver(1);
