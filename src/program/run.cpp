@@ -210,8 +210,10 @@ void add_run(CLI::App& app, Context& context) {
           "input", a->input,
           "Folder of the recording, whose layout (Spartan, KITTI odometry, KITTI raw, EuRoC/ASL, image folders) is "
           "detected and printed, or a video with the images of both cameras side by side; or the address of a live "
-          "stream: replay:FOLDER plays a recording at the pace of its stamps, sim:SCENARIO is a simulated rover whose "
-          "cameras obey.")
+          "stream: live:RIG is the cameras with a driver in a rig file, aravis:LEFT,RIGHT and gst:PIPELINE are cameras "
+          "for "
+          "the rig of --rig, replay:FOLDER plays a recording at the pace of its stamps, sim:SCENARIO is a simulated "
+          "rover whose cameras obey.")
       ->required();
   command
       ->add_option("-o,--output", a->output,
