@@ -204,7 +204,7 @@ std::string error_on_bus(CameraPipeline& opened) {
   if (!found) return "";
   GError* error = nullptr;
   gst_message_parse_error(found.get(), &error, nullptr);
-  const std::string text = error->message;
+  std::string text = error->message;
   g_error_free(error);
   return text;
 }
@@ -246,9 +246,8 @@ int deliver(CameraPipeline& opened, const QueuedSample& taken, SpartanCameraImag
     image.width /= 2;
     SpartanCameraImage right = image;
     right.side = 1;
-    if (sample->pixels != nullptr)
-      right.pixels =
-          sample->pixels + static_cast<std::ptrdiff_t>(image.width) * image.bytes_per_sample * image.channels;
+    const auto half = static_cast<std::ptrdiff_t>(image.width) * image.bytes_per_sample * image.channels;
+    if (sample->pixels != nullptr) right.pixels = sample->pixels + half;
     right.token = new Token{sample};
     opened.right = right;
   }
@@ -281,27 +280,27 @@ void* spartan_camera_open(const SpartanCameraSettings* settings, char* message, 
   return nullptr;
 }
 
-int spartan_camera_read(void* handle, std::int64_t timeout_ns, SpartanCameraImage* image, char* message,
+int spartan_camera_read(void* opened, std::int64_t timeout_ns, SpartanCameraImage* image, char* message,
                         std::size_t size) {
-  auto& opened = *static_cast<CameraPipeline*>(handle);
-  if (opened.right) {
-    *image = *opened.right;
-    opened.right.reset();
+  auto& pipeline = *static_cast<CameraPipeline*>(opened);
+  if (pipeline.right) {
+    *image = *pipeline.right;
+    pipeline.right.reset();
     return SPARTAN_CAMERA_IMAGE;
   }
-  std::unique_lock lock(opened.mutex);
-  opened.changed.wait_for(lock, std::chrono::nanoseconds(timeout_ns),
-                          [&] { return !opened.queue.empty() || opened.ended == opened.sinks; });
-  if (!opened.queue.empty()) {
-    const QueuedSample taken = opened.queue.front();
-    opened.queue.pop_front();
-    opened.changed.notify_all();
+  std::unique_lock lock(pipeline.mutex);
+  pipeline.changed.wait_for(lock, std::chrono::nanoseconds(timeout_ns),
+                            [&] { return !pipeline.queue.empty() || pipeline.ended == pipeline.sinks; });
+  if (!pipeline.queue.empty()) {
+    const QueuedSample taken = pipeline.queue.front();
+    pipeline.queue.pop_front();
+    pipeline.changed.notify_all();
     lock.unlock();
-    return deliver(opened, taken, *image);
+    return deliver(pipeline, taken, *image);
   }
-  if (opened.ended == opened.sinks) return SPARTAN_CAMERA_END;
+  if (pipeline.ended == pipeline.sinks) return SPARTAN_CAMERA_END;
   lock.unlock();
-  const std::string why = error_on_bus(opened);
+  const std::string why = error_on_bus(pipeline);
   if (why.empty()) return SPARTAN_CAMERA_NONE_YET;
   report(why, message, size);
   return SPARTAN_CAMERA_LOST;
@@ -311,8 +310,8 @@ void spartan_camera_release(void* token) {
   delete static_cast<Token*>(token);
 }
 
-int spartan_camera_properties(void* handle) {
-  return static_cast<CameraPipeline*>(handle)->live ? 0 : SPARTAN_CAMERA_WAITS;
+int spartan_camera_properties(void* opened) {
+  return static_cast<CameraPipeline*>(opened)->live ? 0 : SPARTAN_CAMERA_WAITS;
 }
 
 int spartan_camera_trigger(void*, char* message, std::size_t size) {
@@ -325,6 +324,6 @@ int spartan_camera_set_exposure(void*, double, double, char* message, std::size_
   return 0;
 }
 
-void spartan_camera_close(void* handle) {
-  delete static_cast<CameraPipeline*>(handle);
+void spartan_camera_close(void* opened) {
+  delete static_cast<CameraPipeline*>(opened);
 }

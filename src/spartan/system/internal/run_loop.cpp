@@ -336,10 +336,11 @@ void RunLoop::report_disk() {
   const auto error = recorder_->disk_error();
   if (error.has_value() == disk_failed_) return;
   disk_failed_ = error.has_value();
-  if (error)
+  if (error) {
     hooks_.log.error("results wait in memory, their commit is tried again: " + error->message());
-  else
+  } else {
     hooks_.log.warning("the disk can be written to again: all results are committed");
+  }
 }
 
 void RunLoop::report_estimate() {

@@ -225,7 +225,7 @@ Status RunRecorder::commit(std::optional<RunStore::Checkpoint> checkpoint, MapCh
   }
   const bool waits = transactions_.size() > 1 && std::chrono::steady_clock::now() < retry_;
   if (waits && !flushing) return {};
-  const Status committed = commit_transactions();
+  Status committed = commit_transactions();
   if (committed || flushing || !may_wait_for_disk(committed)) return committed;
   note_disk(committed);
   retry_ = std::chrono::steady_clock::now() + kRetry;

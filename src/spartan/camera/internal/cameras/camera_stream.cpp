@@ -32,7 +32,7 @@ CameraStream::~CameraStream() {
   changed_.notify_all();
 }
 
-Result<std::unique_ptr<CameraStream>> CameraStream::create(const StreamInfo& info, OpenDevice open,
+Result<std::unique_ptr<CameraStream>> CameraStream::create(const StreamInfo& info, const OpenDevice& open,
                                                            const CameraStreamOptions& options, const Log& log) {
   std::unique_ptr<CameraStream> stream(new CameraStream(info, options, log));
   for (const StereoPair& pair : stream->info_.rig.pairs) {
@@ -192,7 +192,7 @@ Result<StreamRead> CameraStream::read(std::chrono::nanoseconds timeout) {
 void CameraStream::take_all(Clock::time_point now) {
   for (const auto& feed : feeds_) {
     const bool alone = is_one_camera_silent(*feed, now);
-    while (auto pair = feed->pairing.take(alone ? now + options_.pair_wait : now)) take_pair(*feed, std::move(*pair));
+    while (auto pair = feed->pairing.take(alone ? now + options_.pair_wait : now)) take_pair(*feed, *pair);
   }
   changed_.notify_all();
 }
@@ -212,11 +212,11 @@ bool CameraStream::waits() const {
   });
 }
 
-void CameraStream::take_pair(Feed& feed, ImagePair pair) {
+void CameraStream::take_pair(Feed& feed, const ImagePair& pair) {
   feed.alone_in_row = pair.is_complete() ? 0 : feed.alone_in_row + 1;
   Clock::time_point complete = pair.first().image.complete;
   if (pair.is_complete()) complete = std::max(complete, pair.images[1]->image.complete);
-  push(sample_of(feed, std::move(pair)), complete);
+  push(sample_of(feed, pair), complete);
 }
 
 void CameraStream::push(Sample sample, Clock::time_point arrived) {
@@ -242,7 +242,7 @@ StereoFrame CameraStream::frame_of(const Feed& feed, const ImagePair& pair) cons
   return frame;
 }
 
-Sample CameraStream::sample_of(Feed& feed, ImagePair pair) {
+Sample CameraStream::sample_of(Feed& feed, const ImagePair& pair) {
   StereoFrame frame = frame_of(feed, pair);
   frame.frame_id = next_frame_id_++;
   if (auto missing = fault_of(feed, pair, frame)) {

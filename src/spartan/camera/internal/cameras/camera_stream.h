@@ -33,7 +33,7 @@ class CameraStream : public SampleStream, public CameraControl {
  public:
   /// Waits for the first frame of each pair, which is its preview. Codes: `configuration` (no pair has drivers, or
   /// those of a pair do not fit), `read_error` (a camera does not answer, or delivers no image), and those of `open`.
-  static Result<std::unique_ptr<CameraStream>> create(const StreamInfo& info, OpenDevice open,
+  static Result<std::unique_ptr<CameraStream>> create(const StreamInfo& info, const OpenDevice& open,
                                                       const CameraStreamOptions& options, const Log& log);
   ~CameraStream() override;
   CameraStream(const CameraStream&) = delete;
@@ -72,8 +72,8 @@ class CameraStream : public SampleStream, public CameraControl {
   void add(Feed& feed, int side, StampedImage image);
   static bool is_one_camera_silent(const Feed& feed, std::chrono::steady_clock::time_point now);
   void take_all(std::chrono::steady_clock::time_point now);
-  void take_pair(Feed& feed, ImagePair pair);
-  Sample sample_of(Feed& feed, ImagePair pair);
+  void take_pair(Feed& feed, const ImagePair& pair);
+  Sample sample_of(Feed& feed, const ImagePair& pair);
   StereoFrame frame_of(const Feed& feed, const ImagePair& pair) const;
   std::optional<MissingFrame> fault_of(Feed& feed, const ImagePair& pair, const StereoFrame& frame) const;
   std::string why_missing(const Feed& feed, std::size_t side) const;

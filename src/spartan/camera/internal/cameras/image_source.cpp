@@ -121,10 +121,11 @@ void ImageSource::run_commands(Clock::time_point first_trigger) {
     {
       std::unique_lock lock(mutex_);
       const auto wanted = [this] { return stop_ || pending_exposure_ || !pending_triggers_.empty(); };
-      if (by_rate)
+      if (by_rate) {
         stop_changed_.wait_until(lock, next, wanted);
-      else
+      } else {
         stop_changed_.wait(lock, wanted);
+      }
       if (stop_) return;
       std::swap(exposure, pending_exposure_);
       std::swap(triggers, pending_triggers_);
@@ -155,7 +156,7 @@ Status ImageSource::send_trigger(CameraDevice& device, std::int64_t number) {
     open_triggers_.push_back({number, now});
     ++counts_[0].triggers;
   }
-  const Status triggered = device.trigger();
+  Status triggered = device.trigger();
   if (triggered) return {};
   const std::lock_guard lock(mutex_);
   const auto open = std::find_if(open_triggers_.begin(), open_triggers_.end(),
@@ -236,18 +237,18 @@ void ImageSource::reopen() {
 
 void ImageSource::deliver(CameraImage image) {
   const int side = image.side == 0 ? 0 : 1;
-  const bool fresh = is_new(image);
+  if (!is_new(image)) return;
   StampedImage stamped = this->stamped(std::move(image));
   {
     const std::lock_guard lock(mutex_);
     SourceCounts& counts = counts_[static_cast<std::size_t>(side)];
-    if (fresh) ++(stamped.image.image.empty() ? counts.incomplete : counts.images);
-    if (fresh) stamped.trigger = answer_trigger(counts, stamped.stamp, host_.stamp_of(stamped.image.complete));
+    ++(stamped.image.image.empty() ? counts.incomplete : counts.images);
+    stamped.trigger = answer_trigger(counts, stamped.stamp, host_.stamp_of(stamped.image.complete));
     if (!stamped.trusted) ++counts.wrong_stamps;
     counts.clock_sigma_s = stamped.sigma_s;
     counts.clock_rate = clocks_[static_cast<std::size_t>(side)].rate();
   }
-  if (fresh) deliver_(side, std::move(stamped));
+  deliver_(side, std::move(stamped));
 }
 
 // Counts what the camera has left out; false of an image that came before.

@@ -133,14 +133,15 @@ CameraImage PluginCamera::image_of(const SpartanCameraImage& image) const {
   const PixelFormat& format =
       formats_[std::min<std::size_t>(static_cast<std::size_t>(image.side), formats_.size() - 1)];
   const bool colour = image.channels == 3, wide = image.bytes_per_sample == 2;
-  if (colour && wide)
+  if (colour && wide) {
     out.image = shared_image<Rgb16>(image, std::move(owner), format);
-  else if (colour)
+  } else if (colour) {
     out.image = shared_image<Rgb8>(image, std::move(owner), format);
-  else if (wide)
+  } else if (wide) {
     out.image = shared_image<std::uint16_t>(image, std::move(owner), format);
-  else
+  } else {
     out.image = shared_image<std::uint8_t>(image, std::move(owner), format);
+  }
   return out;
 }
 
