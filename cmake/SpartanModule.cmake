@@ -151,3 +151,14 @@ function(spartan_module name)
       LABEL long TIMEOUT 3600)
   endif()
 endfunction()
+
+# spartan_plugin(NAME SOURCE LIBRARIES…)
+# A library that is loaded only where it is needed, because of what it links (camera/internal/plugin_library.h).
+function(spartan_plugin name source)
+  add_library(${name} MODULE ${source})
+  set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_RUNTIME_OUTPUT_DIRECTORY}
+    CXX_VISIBILITY_PRESET default)
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/src)
+  target_link_libraries(${name} PRIVATE spartan_flags ${ARGN})
+  install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/spartan)
+endfunction()

@@ -371,21 +371,21 @@ Result<RunOutcome> run(const RunRequest& request, const RunHooks& hooks) {
   }
 }
 
-Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& given, const RunHooks& hooks) {
+Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, const RunHooks& hooks) {
   const RunStart start;
-  RunRequest request = given;
+  RunRequest wanted = request;
   const StereoPair* const odometry = odometry_pair_of(stream.info().rig, request.options);
   try {
     auto unit = request.pan_tilt.empty() ? std::unique_ptr<PanTiltControl>() : open_pan_tilt(request.pan_tilt);
     if (!unit) return failure(unit);
-    if (*unit) request.options = with_unit_error(request.options, stream.info().rig, **unit);
-    auto panorama = panorama_of(stream, unit->get(), request, hooks);
+    if (*unit) wanted.options = with_unit_error(request.options, stream.info().rig, **unit);
+    auto panorama = panorama_of(stream, unit->get(), wanted, hooks);
     if (!panorama) return failure(panorama);
     std::optional<PanoramaStream> labelled;
     if (*panorama) labelled.emplace(stream, **panorama);
     SampleStream& samples = labelled ? *labelled : stream;
     QueuedStream queue(samples, odometry ? odometry->name : "", kQueueBytes);
-    return with_store(run_source({samples, nullptr, &queue, panorama->get()}, start, request, hooks),
+    return with_store(run_source({samples, nullptr, &queue, panorama->get()}, start, wanted, hooks),
                       RunFolder{request.output}.store());
   } catch (const std::bad_alloc& exception) {
     return tl::unexpected(out_of_memory(exception));

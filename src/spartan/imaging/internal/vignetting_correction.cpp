@@ -58,7 +58,7 @@ void VignettingCorrection::apply_any(ImageView<const T> image, ImageView<T> resu
   }
   const auto full_scale = static_cast<std::uint32_t>(full_scale_), black = static_cast<std::uint32_t>(black_level_);
   workers.parallel_for(0, image.height(), kVignettingRowsPerPart, [&](int begin, int end) {
-    constexpr std::uint32_t kOne = 1U << kFractionBits, kHalf = kOne / 2;
+    constexpr std::uint32_t kUnity = 1U << kFractionBits, kHalf = kUnity / 2;
     for (int y = begin; y < end; ++y) {
       const T* const in = image.row(y);
       const std::uint16_t* const factors = factors_.row(y);
@@ -66,7 +66,7 @@ void VignettingCorrection::apply_any(ImageView<const T> image, ImageView<T> resu
       for (int x = 0; x < image.width(); ++x) {
         // black + (value − black) · factor
         const std::uint32_t bright = in[x] * std::uint32_t{factors[x]} + kHalf;
-        const std::uint32_t excess = black * (std::uint32_t{factors[x]} - kOne);
+        const std::uint32_t excess = black * (std::uint32_t{factors[x]} - kUnity);
         const std::uint32_t level = bright > excess ? (bright - excess) >> kFractionBits : 0;
         out[x] = static_cast<T>(std::min(level, full_scale));
       }
