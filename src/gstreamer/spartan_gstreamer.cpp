@@ -60,9 +60,12 @@ MappedSample::~MappedSample() {
 }
 
 bool MappedSample::map_video(GstCaps* caps, GstBuffer* buffer) {
-  GstVideoInfo info;
-  GstVideoFrame frame;
-  if (!gst_video_info_from_caps(&info, caps) || !gst_video_frame_map(&frame, &info, buffer, GST_MAP_READ)) return false;
+  GstVideoInfo info{};
+  GstVideoFrame frame{};
+  // Bayer images have caps that are understood and a format that is not.
+  const bool raw = gst_video_info_from_caps(&info, caps) && GST_VIDEO_INFO_FORMAT(&info) != GST_VIDEO_FORMAT_ENCODED &&
+                   GST_VIDEO_INFO_FORMAT(&info) != GST_VIDEO_FORMAT_UNKNOWN;
+  if (!raw || !gst_video_frame_map(&frame, &info, buffer, GST_MAP_READ)) return false;
   frame_ = frame;
   pixels = static_cast<const std::uint8_t*>(GST_VIDEO_FRAME_PLANE_DATA(&*frame_, 0));
   stride_bytes = GST_VIDEO_FRAME_PLANE_STRIDE(&*frame_, 0);

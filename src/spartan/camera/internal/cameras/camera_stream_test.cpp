@@ -205,6 +205,7 @@ TEST_F(CameraStreamTest, ACameraThatIsLostIsOpenedAgainWithItsExposure) {
   auto stream = open(two_cameras());
   ASSERT_TRUE(stream) << stream.error().message();
   ASSERT_TRUE((*stream)->set_exposure("front", {2000, 1.5}));
+  while (scripts["left"].exposures < 1 || scripts["right"].exposures < 1) std::this_thread::sleep_for(milliseconds(1));
   static_cast<void>((*stream)->read(milliseconds(1)));
   scripts["right"].openable = false;
   scripts["right"].add({DeviceRead::State::lost, {}, "unplugged"});

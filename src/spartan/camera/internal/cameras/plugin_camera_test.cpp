@@ -155,6 +155,12 @@ TEST_F(Pipelines, DeliverTheFormatOfTheRig) {
     ASSERT_EQ(frames.size(), 5u) << c.caps;
     EXPECT_EQ(frames[0].left.format(), c.format) << c.caps;
     EXPECT_EQ(frames[0].right.size(), (ImageSize{kWidth, kHeight}));
+    if (c.format.bits != 8 || c.format.layout == PixelLayout::rgb) continue;
+    // The colour bars of the test image: each line of the mosaic has several levels.
+    const auto view = frames[0].right.as<std::uint8_t>();
+    for (int y = 0; y < kHeight / 2; ++y)
+      EXPECT_GT(*std::max_element(&view(0, y), &view(0, y) + kWidth),
+                *std::min_element(&view(0, y), &view(0, y) + kWidth));
   }
 }
 
