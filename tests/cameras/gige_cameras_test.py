@@ -162,7 +162,8 @@ def case_plain(arguments):
     pair = check_accounts(summary)
     assert pair["frames"] > POSES / 2
     odometry = summary["health"]["odometry"]
-    assert odometry["tracking"] > 0.5 * summary["frames"], f"not the images of a drive: {odometry}"
+    # At two triggers the drive may show the same moment; black images would be lost in all frames.
+    assert odometry["lost"] < 0.5 * summary["frames"], f"not the images of a drive: {odometry}"
     assert pair["incomplete"] == 0, "loopback loses no packets"
 
 
