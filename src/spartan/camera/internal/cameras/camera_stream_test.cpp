@@ -226,6 +226,35 @@ TEST_F(CameraStreamTest, ACameraThatIsLostIsOpenedAgainWithItsExposure) {
   EXPECT_EQ((*stream)->camera_reports()[0].cameras[1].losses, 1);
 }
 
+// The first images arrive late, as beside a program that starts.
+TEST_F(CameraStreamTest, StampsIncreaseWhereImagesArriveEarlierThanBefore) {
+  const auto start = Clock::now();
+  const auto add = [&](int id, int late_ms) {
+    for (const char* name : {"left", "right"}) {
+      DeviceRead read = image_read(id, 1);
+      read.image.camera_ns = id * 100'000'000LL;
+      read.image.began = start + milliseconds(100 * id + late_ms);
+      scripts[name].add(read);
+    }
+  };
+  add(1, 150);
+  auto stream = open(two_cameras());
+  ASSERT_TRUE(stream) << stream.error().message();
+  static_cast<void>((*stream)->read(milliseconds(1)));
+  std::optional<Stamp> before;
+  const int late_ms[] = {150, 100, 20, 0, 0};
+  for (int i = 0; i < 5; ++i) {
+    add(i + 2, late_ms[i]);
+    const Sample sample = next(**stream);
+    ASSERT_TRUE(std::holds_alternative<StereoFrame>(sample)) << i;
+    const Stamp stamp = std::get<StereoFrame>(sample).left_stamp;
+    if (before) {
+      EXPECT_GE(seconds_between(*before, stamp), 0.0499) << i;
+    }
+    before = stamp;
+  }
+}
+
 TEST_F(CameraStreamTest, ASilentCameraIsNotWaitedForUntilItDeliversAgain) {
   deliver(1);
   auto stream = open(two_cameras());

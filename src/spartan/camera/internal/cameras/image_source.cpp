@@ -229,6 +229,7 @@ void ImageSource::reopen() {
   log_.warning(fmt::format("camera {} ({}) answers again", request_.names(), request_.driver().source));
   last_ = {};
   clocks_ = {};
+  mapped_ = {};
   const std::lock_guard lock(mutex_);
   device_ = std::move(*device);
   pending_exposure_ = exposure_;
@@ -276,6 +277,20 @@ bool ImageSource::is_new(const CameraImage& image) {
   return true;
 }
 
+// An earlier arrival than all before moves the line back, at first by more than an interval between images: at least
+// half of the camera's interval remains between two stamps.
+void ImageSource::keep_increasing(StampedImage& stamped, const CameraImage& image) {
+  std::optional<Mapped>& last = mapped_[image.side == 0 ? 0 : 1];
+  if (stamped.trusted && last && image.camera_ns > last->camera_ns) {
+    const Stamp least{last->stamp.ns + (image.camera_ns - last->camera_ns) / 2};
+    if (stamped.stamp < least) {
+      stamped.sigma_s = std::hypot(stamped.sigma_s, seconds_between(stamped.stamp, least));
+      stamped.stamp = least;
+    }
+  }
+  if (stamped.trusted) last = Mapped{image.camera_ns, stamped.stamp};
+}
+
 // The middle of the exposure: of a stamp at its begin, half an exposure later; an image is noticed after its end.
 StampedImage ImageSource::stamped(CameraImage image) {
   const CameraDriver& driver = request_.driver();
@@ -292,6 +307,7 @@ StampedImage ImageSource::stamped(CameraImage image) {
     stamped.stamp = Stamp{mapped.host.ns - nanoseconds(after_middle_s)};
     stamped.trusted = mapped.trusted;
     stamped.sigma_s = mapped.sigma_s;
+    keep_increasing(stamped, image);
   } else {
     stamped.stamp = Stamp{end.ns - nanoseconds(exposure_s / 2)};
     stamped.sigma_s = kArrivalSigma_s;

@@ -109,6 +109,7 @@ class ImageSource {
   std::int64_t answer_trigger(SourceCounts& counts, Stamp stamp, Stamp arrival);
   void give_up_triggers();
   StampedImage stamped(CameraImage image);
+  void keep_increasing(StampedImage& stamped, const CameraImage& image);
   std::shared_ptr<CameraDevice> device() const;
   bool wait(std::chrono::steady_clock::time_point until);
 
@@ -140,6 +141,12 @@ class ImageSource {
   };
   std::array<Last, 2> last_;
   std::array<CameraClock, 2> clocks_;
+  // The newest trusted stamp.
+  struct Mapped {
+    std::int64_t camera_ns = 0;
+    Stamp stamp;
+  };
+  std::array<std::optional<Mapped>, 2> mapped_;
 
   bool refused_ = false;  // of the thread of commands
 
