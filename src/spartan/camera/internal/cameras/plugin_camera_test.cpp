@@ -32,6 +32,7 @@ std::string rig_text(const std::string& pixels) {
       camera);
 }
 
+#ifdef SPARTAN_HAS_GSTREAMER
 // A different value at each place of each image.
 Image<std::uint8_t> pattern(int number, int side) {
   Image<std::uint8_t> image(kWidth, kHeight);
@@ -69,11 +70,6 @@ class Pipelines : public ::testing::Test {
     return open_live_stream("gst:" + pipeline, options, {});
   }
 
-  static bool is_missing(const Result<std::unique_ptr<SampleStream>>& stream) {
-    return !stream && (stream.error().code == ErrorCode::configuration ||
-                       stream.error().what.find("no element") != std::string::npos);
-  }
-
   // All frames of the stream.
   static std::vector<StereoFrame> frames_of(SampleStream& stream) {
     std::vector<StereoFrame> frames;
@@ -108,7 +104,6 @@ class Pipelines : public ::testing::Test {
 
 TEST_F(Pipelines, TwoSinksDeliverEveryImageOfAFileUnchanged) {
   auto stream = open(images_of(0) + " ! appsink name=left " + images_of(1) + " ! appsink name=right");
-  if (is_missing(stream)) GTEST_SKIP() << stream.error().message();
   ASSERT_TRUE(stream) << stream.error().message();
   EXPECT_EQ((*stream)->control(), nullptr);
   expect_patterns(frames_of(**stream));
@@ -123,7 +118,6 @@ TEST_F(Pipelines, ASideBySideImageIsCutInTwo) {
       open(fmt::format("compositor name=both sink_1::xpos={} ! video/x-raw,format=AYUV ! videoconvert ! "
                        "appsink name=left {} ! both.sink_0 {} ! both.sink_1",
                        kWidth, images_of(0), images_of(1)));
-  if (is_missing(stream)) GTEST_SKIP() << stream.error().message();
   ASSERT_TRUE(stream) << stream.error().message();
   const auto frames = frames_of(**stream);
   ASSERT_GE(frames.size(), static_cast<std::size_t>(kImages) / 2);
@@ -149,7 +143,6 @@ TEST_F(Pipelines, DeliverTheFormatOfTheRig) {
                         Case{"video/x-raw,format=RGB", "pixel_layout: rgb,", {PixelLayout::rgb, 8}},
                         Case{"video/x-bayer,format=grbg", "pixel_layout: bayer_grbg,", {PixelLayout::bayer_grbg, 8}}}) {
     auto stream = open(source(c.caps), c.pixels);
-    if (is_missing(stream)) GTEST_SKIP() << stream.error().message();
     ASSERT_TRUE(stream) << c.caps << stream.error().message();
     const auto frames = frames_of(**stream);
     ASSERT_EQ(frames.size(), 5u) << c.caps;
@@ -167,7 +160,6 @@ TEST_F(Pipelines, DeliverTheFormatOfTheRig) {
 
 TEST_F(Pipelines, FailWithTheReason) {
   auto none = open("nosuchelement ! appsink name=left");
-  if (!none && none.error().code == ErrorCode::configuration) GTEST_SKIP() << none.error().message();
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::read_error);
   EXPECT_THAT(none.error().message(), HasSubstr("nosuchelement"));
@@ -176,6 +168,8 @@ TEST_F(Pipelines, FailWithTheReason) {
   auto large = open("videotestsrc num-buffers=5 ! video/x-raw,format=GRAY8,width=640,height=480 ! appsink name=left");
   EXPECT_EQ(large.error().code, ErrorCode::read_error) << "images of another size are no frames";
 }
+
+#endif
 
 TEST(CameraAddresses, AreChecked) {
   const auto error = [](const std::string& address, const std::string& rig) {
