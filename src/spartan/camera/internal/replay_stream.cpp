@@ -64,7 +64,11 @@ Result<StreamRead> ReplayStream::read(nanoseconds timeout) {
   const ReplayClock::Time called = clock_.now();
   std::unique_lock lock(mutex_);
   if (!thread_.joinable()) thread_ = std::thread([this] { read_ahead(); });
-  changed_.wait(lock, [this] { return !ahead_.empty() || ended_; });
+  if (!changed_.wait_for(lock, timeout, [this] { return !ahead_.empty() || ended_; })) {
+    lock.unlock();
+    clock_.wait_until(called + timeout);
+    return StreamRead{StreamRead::State::none_yet, {}, clock_.now()};
+  }
   if (ahead_.empty() && !status_) return failure(status_);
   if (ahead_.empty()) return StreamRead{StreamRead::State::end, {}, clock_.now()};
   const Stamp stamp = stamp_of(ahead_.front());
@@ -122,6 +126,8 @@ Result<std::optional<Sample>> ReplayStream::fetch() {
   for (;;) {
     auto sample = fetch_any();
     if (!sample || !*sample || !start_after_ || stamp_of(**sample) > *start_after_) return sample;
+    const std::lock_guard lock(mutex_);
+    if (stopped_) return std::nullopt;
   }
 }
 
