@@ -6,7 +6,7 @@
 A command line is a line of a code block, or an example of --help, that starts with `spartan`. Lines with placeholders
 in capitals, brackets or "…" are synopses. They run in the order of the documents, in a folder that holds what `make
 demo` leaves and the other files that they name. Lines that render a shipped scenario take minutes: --long runs them
-alone. Lines with $SPARTAN_DATA need the recordings. Exit code 77 (skipped) where the program has no simulator.
+alone. Options that the texts for users name (`--option`) must exist. Lines with $SPARTAN_DATA need the recordings. Exit code 77 (skipped) where the program has no simulator.
 """
 import os
 import re
@@ -51,6 +51,17 @@ def lines_of_help(program):
         yield f"spartan {' '.join(words)} --help", example[1]
 
 
+def check_named_options(program, source):
+    own = subprocess.run([program, "--help"], check=True, capture_output=True, text=True, timeout=60).stdout
+    known = {option for text in [own, *(text for _, text in helps(program))] for option in re.findall(r"--[a-z][a-z-]+", text)}
+    texts = [source / "docs/limits.md", *(source / "docs/tutorials").glob("*.md"), *(source / "docs/reference").glob("*.md")]
+    for text in texts:
+        for number, line in enumerate(text.read_text(encoding="utf-8").splitlines(), 1):
+            for option in re.findall(r"`(--[a-z][a-z-]+)", line):
+                if option not in known:
+                    sys.exit(f"failed: {text.relative_to(source)}:{number}: no command has the option {option}")
+
+
 def prepare(program, source, small_runs, work):
     """What `make demo` leaves, from a smaller scenario, and the files that the examples name."""
     def spartan(*arguments):
@@ -92,6 +103,7 @@ def main():
     lines = [*lines_of_documents(source), *lines_of_help(program)]
     if len(lines) < 20:
         sys.exit(f"failed: only {len(lines)} command lines were found")
+    check_named_options(program, source)
     count = 0
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)

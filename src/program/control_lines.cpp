@@ -1,12 +1,6 @@
 #include "program/control_lines.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <array>
-#include <cerrno>
-#include <system_error>
 
 namespace spartan::program {
 namespace {
@@ -16,30 +10,17 @@ constexpr std::size_t kLongestLine = 1000;
 }  // namespace
 
 Result<std::unique_ptr<ControlLines>> ControlLines::open(const std::string& fifo, const Log& log) {
-  const auto failed = [&](const std::string& what) {
-    return failure(ErrorCode::output, what + ": " + std::system_category().message(errno), fifo);
-  };
-  if (::mkfifo(fifo.c_str(), S_IRUSR | S_IWUSR) != 0 && errno != EEXIST) return failed("cannot be created");
-  struct stat status {};
-  if (::stat(fifo.c_str(), &status) != 0) return failed("cannot be opened");
-  if (!S_ISFIFO(status.st_mode))
-    return failure(ErrorCode::output, "exists and is no FIFO", fifo, "remove it, or name another path");
-  // Also for writing: there is no end of the file when a writer goes.
-  const int file = ::open(fifo.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-  if (file < 0) return failed("cannot be opened");
-  return std::unique_ptr<ControlLines>(new ControlLines(file, log));
-}
-
-ControlLines::~ControlLines() {
-  ::close(file_);
+  auto opened = Fifo::open(fifo);
+  if (!opened) return failure(opened);
+  return std::unique_ptr<ControlLines>(new ControlLines(std::move(*opened), log));
 }
 
 void ControlLines::receive() {
   std::array<char, 512> bytes{};
   for (;;) {
-    const ssize_t n = ::read(file_, bytes.data(), bytes.size());
-    if (n <= 0) return;
-    received_.append(bytes.data(), static_cast<std::size_t>(n));
+    const std::size_t n = fifo_.read(bytes);
+    if (n == 0) return;
+    received_.append(bytes.data(), n);
     if (received_.size() > kLongestLine && received_.find('\n') == std::string::npos) received_.clear();
   }
 }

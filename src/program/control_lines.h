@@ -4,7 +4,9 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "spartan/core/fifo.h"
 #include "spartan/core/log.h"
 #include "spartan/core/result.h"
 #include "spartan/system/run.h"
@@ -14,20 +16,17 @@ namespace spartan::program {
 /// Reads "panorama" and "stop"; other lines are logged. Writers may come and go.
 class ControlLines {
  public:
-  /// Creates the FIFO where there is none. Code `output`: it cannot be created or opened, or is no FIFO.
+  /// Codes as Fifo::open().
   static Result<std::unique_ptr<ControlLines>> open(const std::string& fifo, const Log& log);
-  ~ControlLines();
-  ControlLines(const ControlLines&) = delete;
-  ControlLines& operator=(const ControlLines&) = delete;
 
   /// The next command; none where no whole line has arrived. Does not wait.
   std::optional<RunCommand> next();
 
  private:
-  ControlLines(int file, const Log& log) : file_(file), log_(log) {}
+  ControlLines(Fifo fifo, const Log& log) : fifo_(std::move(fifo)), log_(log) {}
   void receive();
 
-  int file_;
+  Fifo fifo_;
   Log log_;
   std::string received_;
 };

@@ -19,6 +19,9 @@ void add_live_options(CLI::App& command, LiveArguments& arguments) {
       ->check(CLI::PositiveNumber);
   command.add_option("--passes", arguments.options.passes, "How often a replay plays its recording (default 1).")
       ->check(CLI::PositiveNumber);
+  command.add_option("--sensors", arguments.options.sensors,
+                     "Of cameras: a FIFO, created if there is none, whose lines are samples of the other sensors: "
+                     "imu,STAMP_NS,… as in the tables of a recording; see the page on formats (default: none).");
   command
       .add_option("--set-scenario", arguments.scenario_keys,
                   "Of a simulation: set one key of the scenario, e.g. rover=ordinary. Repeatable, in this order.")
@@ -37,6 +40,8 @@ Result<std::unique_ptr<SampleStream>> open_live_input(const Context& context, co
     options.log = context.log;
     return open_live_stream(address, open, options);
   }
+  if (!arguments.options.sensors.empty())
+    return failure(ErrorCode::usage, "brings the samples of its sensors along", address, "omit --sensors");
   SimulationArguments simulation;
   simulation.scenario = address.substr(kSimulation.size());
   simulation.set = arguments.scenario_keys;

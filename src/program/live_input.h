@@ -18,7 +18,7 @@ struct LiveArguments {
   std::vector<std::string> scenario_keys = {};  ///< assignments "group.key=value"
 };
 
-/// Adds --speed, --passes and --set-scenario.
+/// Adds --speed, --passes, --sensors and --set-scenario.
 void add_live_options(CLI::App& command, LiveArguments& arguments);
 
 /// Whether an input is the address of a live stream, and not a recording.

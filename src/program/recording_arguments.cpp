@@ -21,6 +21,11 @@ void add_recording_options(CLI::App& command, RecordingArguments& a) {
       .add_option("--bits", a.bits,
                   "Significant bits of the samples of 16-bit images (default: by the calibration, else by the images).")
       ->check(CLI::Range(9, 16));
+  command
+      .add_option("--pair-tolerance", a.pair_tolerance_s,
+                  "Largest difference in seconds of the time stamps of the two images of a frame (default 0.005); "
+                  "raising it pairs images of cameras that are not triggered together.")
+      ->check(CLI::Range(0.0, 1.0));
 }
 
 Result<OpenOptions> open_options(const RecordingArguments& a) {
@@ -36,6 +41,7 @@ Result<OpenOptions> open_options(const RecordingArguments& a) {
   open.times_file = a.times;
   open.fps = a.fps;
   open.bits = a.bits;
+  open.pair_tolerance_s = a.pair_tolerance_s;
   return open;
 }
 

@@ -13,9 +13,11 @@ struct RecordingArguments {
   std::string rig, format, left, right, times;
   double fps = 0;
   int bits = 0;
+  double pair_tolerance_s = OpenOptions().pair_tolerance_s;
 };
 
-/// `--format`, `--left`, `--right`, `--times`, `--fps`, `--bits`, for commands that read a recording.
+/// `--format`, `--left`, `--right`, `--times`, `--fps`, `--bits`, `--pair-tolerance`, for commands that read a
+/// recording.
 void add_recording_options(CLI::App& command, RecordingArguments& arguments);
 /// Code `usage` for an unknown format.
 Result<OpenOptions> open_options(const RecordingArguments& arguments);

@@ -9,6 +9,7 @@
 #include "spartan/camera/internal/cameras/camera_stream.h"
 #include "spartan/camera/internal/cameras/plugin_camera.h"
 #include "spartan/camera/internal/replay_stream.h"
+#include "spartan/camera/internal/sensor_line_stream.h"
 #include "spartan/camera/recording.h"
 #include "spartan/camera/sample_stream.h"
 
@@ -28,7 +29,9 @@ StreamResult open_cameras(const std::string& address, const std::string& rig_fil
   info.name = std::filesystem::path(rig_file).stem().string();
   internal::CameraStreamOptions camera_options;
   camera_options.pair_tolerance_s = open.pair_tolerance_s;
-  return internal::CameraStream::create(info, internal::open_plugin_camera, camera_options, options.log);
+  auto cameras = internal::CameraStream::create(info, internal::open_plugin_camera, camera_options, options.log);
+  if (!cameras || options.sensors.empty()) return cameras;
+  return internal::SensorLineStream::open(std::move(*cameras), options.sensors);
 }
 
 // The sources of the left and the right camera in an address: the ids of two cameras, or one pipeline.
@@ -67,6 +70,8 @@ StreamResult open_address(const std::string& address, const OpenOptions& open, c
 }
 
 StreamResult open_replay(const std::string& address, const OpenOptions& open, const LiveOptions& options) {
+  if (!options.sensors.empty())
+    return failure(ErrorCode::usage, "brings the samples of its sensors along", address, "omit --sensors");
   auto recording = open_recording(address.substr(kReplay.size()), open);
   if (!recording) return failure(recording);
   return std::make_unique<internal::ReplayStream>(std::move(*recording), options.speed, options.passes);

@@ -167,6 +167,9 @@ struct LiveOptions {
   double speed = 1;  ///< of a stream that is not real: seconds of its stamps in a second
   int passes = 1;    ///< how often a recording is played
   Log log = {};      ///< of cameras that are lost and found again
+  /// Of cameras: path of a FIFO, created if there is none, from which samples of the other sensors are read
+  /// (internal/sensor_lines.h, docs/reference/formats); empty: there are none.
+  std::string sensors = {};
 };
 
 /// Whether an input is the address of a live stream ("replay:FOLDER") and not the folder of a recording.
@@ -179,8 +182,9 @@ bool is_live_address(std::string_view input);
 ///   pipeline of GStreamer with a side-by-side image or two sinks `left` and `right`; for the odometry's pair of
 ///   OpenOptions::rig_file, with what the drivers of its cameras state besides.
 ///
-/// Codes: `usage` (no such kind of stream, speed or passes not positive), `configuration` (drivers, or no plugin for
-/// them), `read_error` (cameras), and those of open_recording() and read_rig_yaml().
+/// Codes: `usage` (no such kind of stream, speed or passes not positive, `sensors` of a replay), `output` (the FIFO),
+/// `configuration` (drivers, or no plugin for them), `read_error` (cameras), and those of open_recording() and
+/// read_rig_yaml().
 Result<std::unique_ptr<SampleStream>> open_live_stream(const std::string& address, const OpenOptions& open,
                                                        const LiveOptions& options);
 

@@ -189,6 +189,7 @@ void ThreadPool::parallel_for(int begin, int end, int grain, const std::function
   if (end <= begin) return;
   const int parts = (end - begin + grain - 1) / grain;
   const auto run_part = [&](int part) {
+    throw_if_cancelled();
     const int from = begin + part * grain;
     body(from, std::min(end, from + grain));
   };
@@ -209,17 +210,39 @@ BackgroundTask ThreadPool::start(std::function<void()> work) const {
 void ThreadPool::parallel_for_parts(int parts, const std::function<void(int, int)>& body) const {
   std::atomic<int> next = 0;
   parallel_for(0, std::min(parts, threads_), 1, [&](int worker, int) {
-    for (int part = next++; part < parts; part = next++) body(part, worker);
+    for (int part = next++; part < parts; part = next++) {
+      throw_if_cancelled();
+      body(part, worker);
+    }
   });
 }
 
 void ThreadPool::parallel_invoke(const std::function<void()>& first, const std::function<void()>& second) const {
+  const auto run = [&](const std::function<void()>& work) {
+    throw_if_cancelled();
+    work();
+  };
   if (!arena_) {
-    first();
-    second();
+    run(first);
+    run(second);
     return;
   }
-  arena_->workers.run(2, [&](int part) { part == 0 ? first() : second(); });
+  arena_->workers.run(2, [&](int part) { run(part == 0 ? first : second); });
+}
+
+ThreadPool ThreadPool::cancellable() const {
+  ThreadPool pool = *this;
+  pool.cancelled_ = std::make_shared<std::atomic<bool>>(false);
+  return pool;
+}
+
+void ThreadPool::cancel() const {
+  if (!cancelled_) throw std::logic_error("ThreadPool: is not cancellable");
+  *cancelled_ = true;
+}
+
+void ThreadPool::throw_if_cancelled() const {
+  if (cancelled_ && *cancelled_) throw Cancelled();
 }
 
 }  // namespace spartan

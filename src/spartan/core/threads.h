@@ -1,6 +1,8 @@
 // A thread pool with a bounded number of threads, passed to the stages by value.
 #pragma once
 
+#include <atomic>
+#include <exception>
 #include <functional>
 #include <memory>
 
@@ -30,6 +32,12 @@ class BackgroundTask {
   std::shared_ptr<State> state_;
 };
 
+/// Thrown by the loops of a ThreadPool that was cancelled.
+class Cancelled : public std::exception {
+ public:
+  const char* what() const noexcept override { return "cancelled"; }
+};
+
 /// A bounded set of worker threads (a TBB task arena). Copies share the threads.
 class ThreadPool {
  public:
@@ -51,10 +59,18 @@ class ThreadPool {
   /// is one of the pool: meanwhile its loops have a thread less.
   BackgroundTask start(std::function<void()> work) const;
 
+  /// The same threads. The loops of the result and of its copies can be ended by cancel().
+  ThreadPool cancellable() const;
+  /// From now on the loops throw Cancelled before their next part. Throws std::logic_error where the pool is not
+  /// cancellable().
+  void cancel() const;
+
  private:
   struct Arena;
+  void throw_if_cancelled() const;
   int threads_ = 1;
   std::shared_ptr<Arena> arena_;
+  std::shared_ptr<std::atomic<bool>> cancelled_;  // null: it cannot be
 };
 
 }  // namespace spartan

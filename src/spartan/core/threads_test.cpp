@@ -180,7 +180,26 @@ TEST(BackgroundTask, LeavesTheLoopsOfThePoolRunning) {
   task.wait();
 }
 
+TEST(ThreadPool, CancelEndsTheLoopsOfItsCopiesAndOfNoOtherPool) {
+  for (const int threads : {1, 2}) {
+    const ThreadPool workers(threads), pool = workers.cancellable(), copy = pool;
+    std::atomic<int> count = 0;
+    const auto add = [&](int, int) { ++count; };
+    pool.parallel_for(0, 4, 1, add);
+    EXPECT_EQ(count, 4);
+    EXPECT_THROW(copy.parallel_for(0, 1000, 1, [&](int, int) { pool.cancel(), ++count; }), Cancelled);
+    EXPECT_LE(count, 4 + threads) << "parts that have begun";
+    EXPECT_THROW(pool.parallel_for(0, 1, 1, add), Cancelled);
+    EXPECT_THROW(pool.parallel_for_parts(1, add), Cancelled);
+    EXPECT_THROW(pool.parallel_invoke([] {}, [] {}), Cancelled);
+    count = 0;
+    workers.parallel_for(0, 4, 1, add);
+    EXPECT_EQ(count, 4);
+  }
+}
+
 TEST(ThreadPool, RejectInvalidArguments) {
+  EXPECT_THROW(ThreadPool(1).cancel(), std::logic_error);
   EXPECT_THROW(ThreadPool(0), std::invalid_argument);
   EXPECT_THROW(ThreadPool(1).parallel_for(0, 1, 0, [](int, int) {}), std::invalid_argument);
 }

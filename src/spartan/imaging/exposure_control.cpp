@@ -90,8 +90,7 @@ GroundBrightness GroundMeter::measure(const StereoFrame& frame, const Eigen::Vec
     const Eigen::Matrix3d camera_from_body =
         rig_.body_from_camera(side->camera, frame.pan_rad, frame.tilt_rad).rotation().conjugate().toRotationMatrix();
     const Eigen::Vector3f up = (camera_from_body * up_in_body).cast<float>();
-    const auto& driver = rig_.find_camera(side->camera)->driver;
-    const int black = driver ? static_cast<int>(std::lround(driver->black_level)) : 0;
+    const int black = rig_.find_camera(side->camera)->black_level();
     const int full_scale = image->format().full_scale() - black;
     for (const Probe& probe : side->probes) {
       if (probe.x >= image->width() || probe.y >= image->height()) continue;

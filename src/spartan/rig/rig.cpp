@@ -205,6 +205,10 @@ bool operator==(const PanTiltUnit& a, const PanTiltUnit& b) {
          a.rest_tilt_rad == b.rest_tilt_rad;
 }
 
+int Camera::black_level() const {
+  return driver ? static_cast<int>(std::lround(driver->black_level)) : 0;
+}
+
 bool operator==(const Camera& a, const Camera& b) {
   return a.name == b.name && a.size == b.size && a.model == b.model && a.pixel_format == b.pixel_format &&
          a.vignetting == b.vignetting && a.self_mask == b.self_mask && a.mount == b.mount &&

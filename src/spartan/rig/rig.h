@@ -75,6 +75,9 @@ struct Camera {
   std::string mount = "body";  ///< "body" or the name of a pan-tilt unit
   Pose mount_from_camera;      ///< camera: optical frame (x right, y down, z forward)
   std::optional<CameraDriver> driver = {};  ///< none: a camera of recordings
+
+  /// Value of a stored sample without light, as the driver states it, to the nearest integer; 0 without one.
+  int black_level() const;
   friend bool operator==(const Camera&, const Camera&);
 };
 

@@ -147,7 +147,7 @@ Status Pipeline::State::start_keyframe_map() {
           return;
         }
         map->matched = map->clock.measure("slam", [&] {
-          return merger.match(*points, keyframe_stage.stamp(), keyframe_stage.prior(), *excerpt, ThreadPool(1));
+          return merger.match(*points, keyframe_stage.stamp(), keyframe_stage.prior(), *excerpt, back_end.one_thread());
         });
       });
   return {};

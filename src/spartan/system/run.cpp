@@ -37,6 +37,9 @@ namespace {
 // Images of a live stream that wait to be processed, at most: some 100 frames of 1120 x 1120 px.
 constexpr std::size_t kQueueBytes = std::size_t{256} << 20U;
 
+// Of the global map, that a live run writes where it is stopped: some 0.4 s.
+constexpr std::int64_t kMostCellsAtOnce = 500'000;
+
 // Where the samples come from.
 struct RunSource {
   SampleStream& stream;
@@ -102,10 +105,13 @@ Result<RunStore> open_store(const RunRequest& request, const RunFolder& folder, 
   return RunStore::create(folder.store(), identity);
 }
 
-Status write_map(GlobalMap& map, const MapOptions& options, bool x_is_east, const ThreadPool& workers,
+Status write_map(GlobalMap& map, const MapOptions& options, bool x_is_east, bool at_once, const ThreadPool& workers,
                  const RunFolder& folder, const Log& log) {
-  if (map.extent().cells() > GlobalMap::kMostCells) {
-    log.warning("the global map is too large for one image; `spartan map export --window` exports a part of it");
+  const std::int64_t cells = map.extent().cells();
+  if (cells > GlobalMap::kMostCells || (at_once && cells > kMostCellsAtOnce)) {
+    log.warning(cells > GlobalMap::kMostCells
+                    ? "the global map is too large for one image; `spartan map export --window` exports a part of it"
+                    : "the files of the global map would take seconds; `spartan map export` writes them");
     return remove_map_files(folder.global_map());  // of the run before it was resumed
   }
   return write_global_map(map, options, x_is_east, workers, folder.global_map());
@@ -149,7 +155,9 @@ Result<RunOutcome> write_results(RunLoop& run_loop, const RunOptions& options, c
     if (Status s = write_file_atomically(folder.trajectory(kind), to_tum(trajectory_of(*frames, kind))); !s)
       return failure(s);
   }
-  if (Status s = write_map(run_loop.global_map(), options.mapping.map, run_loop.heading_east(), workers, folder, log);
+  const bool at_once = facts.live && run_loop.stopped();
+  if (Status s =
+          write_map(run_loop.global_map(), options.mapping.map, run_loop.heading_east(), at_once, workers, folder, log);
       !s) {
     return failure(s);
   }
@@ -225,6 +233,13 @@ void end_recording(QueuedStream& queue, const Log& log) {
     log.warning(fmt::format("{} samples were not recorded: a recording cannot hold them", progress.rejected));
 }
 
+// What follows takes longer the longer the run was, and can be done again with --resume or `spartan export`.
+void report_stop(const RunLoop& run_loop, const Log& log) {
+  const std::chrono::duration<double> since = std::chrono::steady_clock::now() - run_loop.stop_time();
+  log.info(fmt::format("stopped: all results are committed after {:.2f} s; trajectories, map and summary are written",
+                       since.count()));
+}
+
 // A live stream is never the same twice.
 Result<std::string> fingerprint_of(const RunSource& source) {
   if (!source.recording) return source.stream.info().path;
@@ -295,6 +310,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   if (run_loop.usable_frames() > 0) replaced->discard();
   if (source.queue) end_recording(*source.queue, hooks.log);
   if (!processed) return failure(processed);
+  if (run_loop.stopped()) report_stop(run_loop, hooks.log);
   report_sensor_rows(source.stream, hooks.log);
   if (source.queue) report_dropped(*source.queue, hooks.log);
   for (const CameraPairReport& report : source.stream.camera_reports()) hooks.log.info(describe(report));

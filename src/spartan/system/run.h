@@ -44,7 +44,6 @@ struct RunProgress {
   std::string status;     ///< of the last frame: FrameRecord::status
 };
 
-/// Callbacks of a run, called by the thread that called run(). Each may be empty.
 /// What the rover's computer can ask of a live run.
 enum class RunCommand {
   panorama,  ///< take one as soon as the rover is stationary
@@ -59,6 +58,7 @@ struct PanoramaEvent {
   int views = 0;  ///< at its end: the frames that were taken
 };
 
+/// Callbacks of a run, called by the thread that called run(), except where another one is named. Each may be empty.
 struct RunHooks {
   Log log;
   std::function<void(const RunProgress&)> progress;  ///< after each frame
@@ -69,9 +69,8 @@ struct RunHooks {
   std::function<void(const MappedStop&)> map;          ///< each map that was applied
   std::function<std::optional<RunCommand>()> command;  ///< asked between the samples of a live stream, until empty
   std::function<void(const PanoramaEvent&)> panorama;  ///< called by another thread
-  /// Called once, by another thread, where a stage takes longer than RunRequest::watchdog_s (of the back end: ten times
-  /// as long): the run does not end by
-  /// itself, so this function should end the process.
+  /// Called once, by another thread, where a stage takes longer than RunRequest::watchdog_s (of the back end and of the
+  /// disk: ten times as long): the run does not end by itself, so this function should end the process.
   std::function<void(const std::string& stage, double seconds)> hung;
 };
 

@@ -20,17 +20,6 @@ std::string_view trim(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
 }
 
-std::vector<std::string_view> split(std::string_view line, char separator) {
-  std::vector<std::string_view> fields;
-  for (;;) {
-    const std::size_t end = separator == ' ' ? line.find_first_of(kBlanks) : line.find(separator);
-    fields.push_back(trim(line.substr(0, end)));
-    if (end == std::string_view::npos) return fields;
-    line.remove_prefix(end + 1);
-    if (separator == ' ') line = trim(line);
-  }
-}
-
 std::optional<std::size_t> index_of(const std::vector<std::string_view>& names, std::string_view name) {
   const auto found = std::find(names.begin(), names.end(), name);
   return found == names.end() ? std::nullopt : std::optional(static_cast<std::size_t>(found - names.begin()));
@@ -44,6 +33,17 @@ std::string quote(std::string_view text) {
 }
 
 }  // namespace
+
+std::vector<std::string_view> split(std::string_view row, char separator) {
+  std::vector<std::string_view> fields;
+  for (;;) {
+    const std::size_t end = separator == ' ' ? row.find_first_of(kBlanks) : row.find(separator);
+    fields.push_back(trim(row.substr(0, end)));
+    if (end == std::string_view::npos) return fields;
+    row.remove_prefix(end + 1);
+    if (separator == ' ') row = trim(row);
+  }
+}
 
 Result<TableReader> TableReader::open(const std::string& path, TableFormat format) {
   auto lines = LineReader::open(path);

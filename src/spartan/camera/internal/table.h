@@ -65,6 +65,9 @@ class TableReader {
   bool has_all_columns_ = true;
 };
 
+/// The fields of a row, without blanks around them. `separator` as in TableFormat.
+std::vector<std::string_view> split(std::string_view row, char separator);
+
 /// Parses all of `text` as a number; nothing where it is not a number or not finite.
 template <class Number>
 std::optional<Number> parse_number(std::string_view text) {

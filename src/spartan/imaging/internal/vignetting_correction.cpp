@@ -11,10 +11,6 @@ namespace {
 
 constexpr int kVignettingRowsPerPart = 32;  // rows per task; does not affect results
 
-int black_level_of(const Camera& camera) {
-  return camera.driver ? static_cast<int>(std::lround(camera.driver->black_level)) : 0;
-}
-
 }  // namespace
 
 Result<VignettingCorrection> VignettingCorrection::create(const Camera& camera, const ThreadPool& workers) {
@@ -48,7 +44,7 @@ Result<VignettingCorrection> VignettingCorrection::create(const Camera& camera, 
           "cameras." + camera.name + ".vignetting");
     }
   }
-  return VignettingCorrection(std::move(factors), camera.pixel_format.full_scale(), black_level_of(camera));
+  return VignettingCorrection(std::move(factors), camera.pixel_format.full_scale(), camera.black_level());
 }
 
 template <class T>

@@ -17,7 +17,10 @@ void lower_priority(int by) {
 }  // namespace
 
 BackEnd::BackEnd(const ThreadPool& workers, bool own_thread)
-    : pool_(workers), loops_(own_thread ? ThreadPool(1) : workers), own_thread_(own_thread) {}
+    : pool_(workers),
+      loops_((own_thread ? ThreadPool(1) : workers).cancellable()),
+      one_thread_(ThreadPool(1).cancellable()),
+      own_thread_(own_thread) {}
 
 BackEnd::Ticket BackEnd::submit(const char* name, std::function<void()> job) {
   const Lock lock(mutex_);
@@ -105,6 +108,8 @@ void BackEnd::stop() {
     jobs_.clear();
     changed_.notify_all();
   }
+  loops_.cancel();
+  one_thread_.cancel();
   if (thread_.joinable()) thread_.join();
   pump_task_ = {};
 }

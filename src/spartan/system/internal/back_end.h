@@ -27,8 +27,10 @@ class BackEnd {
   BackEnd(const BackEnd&) = delete;
   BackEnd& operator=(const BackEnd&) = delete;
 
-  /// For the loops of the jobs.
+  /// For the loops of the jobs, which stop() ends.
   const ThreadPool& workers() const { return loops_; }
+  /// For those of jobs that use no other thread.
+  const ThreadPool& one_thread() const { return one_thread_; }
 
   /// `name`: a string literal, for running().
   Ticket submit(const char* name, std::function<void()> job);
@@ -40,7 +42,7 @@ class BackEnd {
   void wait(Ticket ticket);
   /// The job that runs now.
   const RunningStage& running() const { return running_; }
-  /// Waits for the job that has begun; the others never run.
+  /// Cancels the loops of the job that has begun and waits for its end; the others never run.
   void stop();
 
   /// Difference of the nice value of its own thread to that of the process.
@@ -54,7 +56,7 @@ class BackEnd {
   void pump();
   void run_thread();
 
-  ThreadPool pool_, loops_;
+  ThreadPool pool_, loops_, one_thread_;
   bool own_thread_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;

@@ -92,6 +92,19 @@ TEST_P(BackEndTest, JobsThatHaveNotBegunNeverRunAfterItsEnd) {
   EXPECT_LT(ran, 100);
 }
 
+TEST_P(BackEndTest, ItsEndCancelsTheLoopsOfTheJobThatHasBegun) {
+  for (const bool one_thread : {false, true}) {
+    std::atomic<bool> began = false;
+    BackEnd back_end(ThreadPool(GetParam().threads), GetParam().own_thread);
+    const ThreadPool& loops = one_thread ? back_end.one_thread() : back_end.workers();
+    back_end.submit("job", [&] {
+      for (began = true;;) loops.parallel_for(0, 100, 10, [](int, int) {});
+    });
+    // Where the caller runs the jobs, none begins without wait().
+    while (!began && (GetParam().own_thread || GetParam().threads > 1)) std::this_thread::sleep_for(1ms);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Runners, BackEndTest,
                          ::testing::Values(Runner{"Caller", 1, false}, Runner{"Worker", 2, false},
                                            Runner{"OwnThread", 1, true}, Runner{"OwnThreadBesideWorkers", 2, true}),

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -15,44 +14,14 @@
 #include <type_traits>
 #include <vector>
 
-#include "spartan/camera/sample_stream.h"
+#include "spartan/camera/stream_decorator.h"
 #include "spartan/core/log.h"
-#include "spartan/core/pose.h"
 #include "spartan/rig/rig.h"
+#include "spartan/system/internal/stationary_check.h"
 #include "spartan/system/run.h"
 #include "spartan/system/run_options.h"
 
 namespace spartan::internal {
-
-/// How the rover moves at a frame of the odometry.
-struct RoverMotion {
-  Stamp stamp;
-  double distance_m = 0;                 ///< path length so far
-  Vector6d velocity = Vector6d::Zero();  ///< Pipeline::body_velocity()
-};
-
-/// Whether the rover is stationary, by frames of the odometry, wheels and gyroscope: none has shown a motion for
-/// kStill_s, and frames or wheels would have shown one.
-class StationaryCheck {
- public:
-  void add(const RoverMotion& motion);
-  void add(const WheelSample& sample);
-  void add(const ImuSample& sample);
-  bool is_stationary() const;
-  /// A motion that is not noise.
-  bool drives() const { return drives_; }
-
-  static constexpr double kStill_s = 0.5;
-
- private:
-  void note(Stamp stamp, double speed_m_s, double rate_rad_s);
-
-  std::deque<WheelSample> wheels_;          // of the last kStill_s
-  std::optional<Stamp> newest_, speed_at_;  // of all samples; of those that show a speed
-  std::optional<Stamp> moved_at_;           // the newest that shows a motion, or the first of all
-  std::optional<Stamp> frame_at_;
-  bool drives_ = false;
-};
 
 /// A panorama begins when it was requested, or the rover has driven PanoramaOptions::every_m since the last one, and as
 /// soon as the rover is stationary; it ends early where the rover drives on. A thread moves the unit, waits until it is
@@ -124,24 +93,13 @@ class Panorama {
 };
 
 /// A stream whose frames are labelled by a Panorama; those that it does not want are left out. Both are borrowed.
-class PanoramaStream : public SampleStream {
+class PanoramaStream : public StreamDecorator {
  public:
-  PanoramaStream(SampleStream& stream, Panorama& panorama) : stream_(stream), panorama_(panorama) {}
+  PanoramaStream(SampleStream& stream, Panorama& panorama) : StreamDecorator(stream), panorama_(panorama) {}
 
-  const StreamInfo& info() const override { return stream_.info(); }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
-  DiscardedSamples discarded() const override { return stream_.discarded(); }
-  std::vector<CameraPairReport> camera_reports() const override { return stream_.camera_reports(); }
-  CameraControl* control() override { return stream_.control(); }
-  PanTiltControl* pan_tilt() override { return stream_.pan_tilt(); }
-  void start_after(Stamp stamp) override { stream_.start_after(stamp); }
-  std::size_t previews(const std::string& pair) const override { return stream_.previews(pair); }
-  Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
-    return stream_.preview(pair, index);
-  }
 
  private:
-  SampleStream& stream_;
   Panorama& panorama_;
 };
 

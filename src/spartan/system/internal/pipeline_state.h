@@ -50,7 +50,7 @@ struct Pipeline::State {
         terrain_stage(options_in.terrain),
         stop_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, back_end.workers()).value(),
                    options_in.stop_delay_frames),
-        keyframe_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, ThreadPool(1)).value(),
+        keyframe_stage(StopMapper::create(options_in.reconstruction, options_in.mapping, back_end.one_thread()).value(),
                        options_in.keyframes, options_in.mapping.map.extent_m),
         merger(MapMerger::create(options_in.slam, options_in.mapping.map, workers_in).value()),
         frozen_cameras(rig.pairs.size()) {

@@ -24,7 +24,7 @@ Result<StreamRead> QueuedStream::read(std::chrono::nanoseconds timeout) {
 void QueuedStream::pump() {
   try {
     while (!stop_) {
-      auto read = stream_.read(kPoll);
+      auto read = behind().read(kPoll);
       if (!read) return queue_.close(failure(read));
       if (read->state == StreamRead::State::end) break;
       if (read->state != StreamRead::State::sample) continue;

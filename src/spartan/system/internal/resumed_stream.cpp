@@ -30,9 +30,9 @@ Result<StreamRead> ResumedStream::read(std::chrono::nanoseconds timeout) {
   if (!std::exchange(live_has_begun_, true) && !last_.empty()) {
     const auto latest =
         std::max_element(last_.begin(), last_.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-    live_.start_after(latest->second);
+    behind().start_after(latest->second);
   }
-  auto read = live_.read(timeout);
+  auto read = behind().read(timeout);
   if (!read || read->state != StreamRead::State::sample) return read;
   if (!is_new(*read->sample)) return StreamRead{StreamRead::State::none_yet, {}, read->arrived};
   number(*read->sample);

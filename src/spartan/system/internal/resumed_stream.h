@@ -9,28 +9,20 @@
 #include <vector>
 
 #include "spartan/camera/recording.h"
-#include "spartan/camera/sample_stream.h"
+#include "spartan/camera/stream_decorator.h"
 
 namespace spartan::internal {
 
 /// Recorded samples come at once, the live ones when they arrive. Samples that the run had processed, or that are in a
 /// recording and come again, are skipped: those whose stamps are not after the last one of their source. Numbers of
 /// live frames go on after those of the recordings.
-class ResumedStream : public SampleStream {
+class ResumedStream : public StreamDecorator {
  public:
   /// `recordings`: in their order. `live` is borrowed.
   ResumedStream(std::vector<std::unique_ptr<Recording>> recordings, SampleStream& live)
-      : recordings_(std::move(recordings)), live_(live) {}
+      : StreamDecorator(live), recordings_(std::move(recordings)) {}
 
-  const StreamInfo& info() const override { return live_.info(); }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
-  DiscardedSamples discarded() const override { return live_.discarded(); }
-  std::vector<CameraPairReport> camera_reports() const override { return live_.camera_reports(); }
-  CameraControl* control() override { return live_.control(); }
-  std::size_t previews(const std::string& pair) const override { return live_.previews(pair); }
-  Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
-    return live_.preview(pair, index);
-  }
 
   /// Before the first call of read(): the latest stamps that were processed, by source_of().
   void skip_until(std::map<std::string, Stamp> last) { last_ = std::move(last); }
@@ -44,7 +36,6 @@ class ResumedStream : public SampleStream {
   void number(Sample& sample);
 
   std::vector<std::unique_ptr<Recording>> recordings_;
-  SampleStream& live_;
   std::size_t next_ = 0;  // recording that is read
   std::map<std::string, Stamp> last_;
   std::int64_t last_id_ = -1, id_offset_ = 0;

@@ -146,7 +146,7 @@ Status RunLoop::process_until_end() {
     const bool can_stop = !recording_ || after_frame_;
     const bool wants_stop = (hooks_.should_stop && hooks_.should_stop()) || execute_commands();
     if (wants_stop && can_stop) {
-      stopped_ = true;
+      stopped_ = std::chrono::steady_clock::now();
       return {};
     }
     const auto read = this->read();

@@ -65,7 +65,9 @@ class RunLoop {
   int usable_frames() const { return usable_frames_; }
   /// Error message of the first frame that was skipped.
   const std::string& first_error() const { return first_error_; }
-  bool stopped() const { return stopped_; }
+  bool stopped() const { return stopped_.has_value(); }
+  /// When the loop saw the request to stop. Only where stopped().
+  std::chrono::steady_clock::time_point stop_time() const { return *stopped_; }
   /// Whether the whole recording was processed.
   bool complete() const { return complete_; }
   bool gravity_measured() const { return pipeline_.gravity_measured(); }
@@ -130,7 +132,7 @@ class RunLoop {
   LatencyRecord latencies_;
   bool disk_failed_ = false;
   bool after_frame_ = true;  // nothing was processed since the last frame of the odometry pair
-  bool stopped_ = false;
+  std::optional<std::chrono::steady_clock::time_point> stopped_;
   bool catching_up_ = false;  // with what a resumed live run had recorded
   bool complete_ = false;
   bool resumed_ = false;

@@ -29,16 +29,6 @@ std::string DeviceRequest::names() const {
   return text;
 }
 
-HostClock::HostClock()
-    : steady_(Clock::now()),
-      epoch_ns_(
-          std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
-              .count()) {}
-
-Stamp HostClock::stamp_of(Time time) const {
-  return Stamp{epoch_ns_ + std::chrono::duration_cast<std::chrono::nanoseconds>(time - steady_).count()};
-}
-
 ImageSource::ImageSource(DeviceRequest request, OpenDevice open, const HostClock& clock, const Log& log)
     : request_(std::move(request)), open_(std::move(open)), host_(clock), log_(log) {}
 

@@ -18,6 +18,7 @@
 #include "spartan/camera/internal/cameras/camera_clock.h"
 #include "spartan/camera/internal/cameras/camera_device.h"
 #include "spartan/camera/internal/cameras/image_pairing.h"
+#include "spartan/camera/internal/host_clock.h"
 #include "spartan/core/log.h"
 #include "spartan/core/result.h"
 #include "spartan/rig/rig.h"
@@ -32,20 +33,6 @@ struct DeviceRequest {
 };
 
 using OpenDevice = std::function<Result<std::unique_ptr<CameraDevice>>(const DeviceRequest&)>;
-
-/// Host time: nanoseconds since the epoch when the clock was made, and since then those of the steady clock, so that a
-/// correction of the system's time does not reach the stamps.
-class HostClock {
- public:
-  using Time = std::chrono::steady_clock::time_point;
-  HostClock();
-  Stamp stamp_of(Time time) const;
-  Stamp now() const { return stamp_of(std::chrono::steady_clock::now()); }
-
- private:
-  Time steady_;
-  std::int64_t epoch_ns_;
-};
 
 /// What one camera of a device has delivered so far. Triggers and losses count for the first one.
 struct SourceCounts {

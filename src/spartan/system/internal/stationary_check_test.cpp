@@ -1,4 +1,4 @@
-#include "spartan/system/internal/panorama.h"
+#include "spartan/system/internal/stationary_check.h"
 
 #include <gtest/gtest.h>
 

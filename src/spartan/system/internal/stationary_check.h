@@ -1,0 +1,43 @@
+// Whether the rover stands still.
+#pragma once
+
+#include <deque>
+#include <optional>
+
+#include "spartan/camera/samples.h"
+#include "spartan/core/pose.h"
+#include "spartan/core/time.h"
+
+namespace spartan::internal {
+
+/// How the rover moves at a frame of the odometry.
+struct RoverMotion {
+  Stamp stamp;
+  double distance_m = 0;                 ///< path length so far
+  Vector6d velocity = Vector6d::Zero();  ///< Pipeline::body_velocity()
+};
+
+/// Whether the rover is stationary, by frames of the odometry, wheels and gyroscope: none has shown a motion for
+/// kStill_s, and frames or wheels would have shown one.
+class StationaryCheck {
+ public:
+  void add(const RoverMotion& motion);
+  void add(const WheelSample& sample);
+  void add(const ImuSample& sample);
+  bool is_stationary() const;
+  /// A motion that is not noise.
+  bool drives() const { return drives_; }
+
+  static constexpr double kStill_s = 0.5;
+
+ private:
+  void note(Stamp stamp, double speed_m_s, double rate_rad_s);
+
+  std::deque<WheelSample> wheels_;          // of the last kStill_s
+  std::optional<Stamp> newest_, speed_at_;  // of all samples; of those that show a speed
+  std::optional<Stamp> moved_at_;           // the newest that shows a motion, or the first of all
+  std::optional<Stamp> frame_at_;
+  bool drives_ = false;
+};
+
+}  // namespace spartan::internal
