@@ -22,12 +22,20 @@ import time
 SKIPPED = 77
 
 
-def images_of(recording):
+def steady_frames(recording, rate_hz):
+    """Rows of frames.csv of the odometry's pair at this rate: without those before the rover has its speed."""
+    with (recording / "frames.csv").open() as rows:
+        frames = [row for row in csv.DictReader(rows) if row["pair"] == "narrow"]
+    stamps = [int(row["left_stamp_ns"]) for row in frames]
+    steady = [i for i in range(len(frames) - 1) if abs((stamps[i + 1] - stamps[i]) * rate_hz - 10**9) < 10**7]
+    return frames[steady[0]:steady[-1] + 2]
+
+
+def images_of(recording, rate_hz):
     """The files of the left and the right camera, in KITTI's layout or of the odometry's pair of a simulation."""
     if (recording / "image_0").exists():
         return [sorted((recording / f"image_{i}").iterdir()) for i in (0, 1)]
-    return [sorted((recording / "images" / "narrow").glob(f"*_{side}.png"), key=lambda p: int(p.stem.split("_")[0]))
-            for side in ("left", "right")]
+    return [[recording / row[side] for row in steady_frames(recording, rate_hz)] for side in ("left", "right")]
 
 
 def wheels_of_poses(recording, rate_hz):
@@ -54,11 +62,6 @@ def lines_of_tables(recording, first_ns):
             for row in list(csv.reader(rows))[1:]:
                 lines.append((1e-9 * (int(row[0]) - first_ns), sensor, ",".join(row[1:])))
     return sorted(lines)
-
-
-def first_stamp(recording):
-    with (recording / "frames.csv").open() as rows:
-        return min(int(row["left_stamp_ns"]) for row in csv.DictReader(rows) if row["pair"] == "narrow")
 
 
 def make_rig(program, recording, images, rate_hz, folder):
@@ -94,13 +97,12 @@ def play(process, fifo, lines, rate_hz):
     return first
 
 
-def print_errors(program, run, recording, first):
+def print_errors(program, run, recording, shift_ns):
     """ATE and drift against the truth, by a trajectory with the stamps of the recording."""
-    shift_s = 1e-9 * (first - first_stamp(recording))
     for kind in ("odometry", "localization"):
         rows = [line.split(" ", 1) for line in (run / f"trajectory_{kind}.tum").read_text().splitlines()]
         shifted = run / f"shifted_{kind}.tum"
-        shifted.write_text("".join(f"{float(stamp) - shift_s:.9f} {pose}\n" for stamp, pose in rows))
+        shifted.write_text("".join(f"{float(stamp) - 1e-9 * shift_ns:.9f} {pose}\n" for stamp, pose in rows))
         done = subprocess.run([program, "evaluate", str(shifted), "--truth", str(recording), "--align", "first"], check=True, capture_output=True, text=True)
         print(kind, done.stdout)
 
@@ -111,17 +113,22 @@ def main():
     parser.add_argument("small_runs", type=pathlib.Path)
     parser.add_argument("--recording", type=pathlib.Path)
     parser.add_argument("--rate", type=int, default=5)
+    parser.add_argument("--set", help="an option of the run, such as gravity_m_s2=3.71")
     arguments = parser.parse_args()
     recording = arguments.recording or arguments.small_runs / "drive"
-    images = images_of(recording)
-    lines = (lines_of_tables(recording, first_stamp(recording)) if arguments.recording
-             else wheels_of_poses(recording, arguments.rate))
+    images = images_of(recording, arguments.rate)
+    if arguments.recording:
+        begin_ns = int(steady_frames(recording, arguments.rate)[0]["left_stamp_ns"])
+        lines = lines_of_tables(recording, begin_ns)
+    else:
+        lines = wheels_of_poses(recording, arguments.rate)
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         rig, pipeline = make_rig(arguments.program, recording, images, arguments.rate, folder)
         fifo, output = folder / "sensors", folder / "run"
         process = subprocess.Popen([arguments.program, "run", pipeline, "--rig", str(rig), "--sensors", str(fifo), "-o",
-                                    str(output), "--publish", "-", "--pair-tolerance", str(0.2 / arguments.rate)],
+                                    str(output), "--publish", "-", "--pair-tolerance", str(0.2 / arguments.rate),
+                                    *(("--set", arguments.set) if arguments.set else ())],
                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         try:
             first = play(process, fifo, lines, arguments.rate)
@@ -144,7 +151,7 @@ def main():
         wheels = [line for line in lines if line[1] == "wheels"]
         assert len(recorded) >= 0.8 * len(wheels), "lines are missing"
         if arguments.recording:
-            print_errors(arguments.program, output, recording, first)
+            print_errors(arguments.program, output, recording, first - begin_ns)
     return 0
 
 

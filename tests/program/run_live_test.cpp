@@ -18,6 +18,8 @@
 
 #include "run_on_small_drive.h"
 #include "spartan/core/files.h"
+#include "spartan/core/image.h"
+#include "spartan/image_io/image_io.h"
 
 namespace spartan {
 namespace {
@@ -212,6 +214,38 @@ TEST_F(RunLive, ResumedTwiceItHasAllRecordings) {
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_EQ(summary_of(path("live"))["frames"], 14);
   EXPECT_TRUE(read_file(path("live/live/3/recording.yaml")));
+}
+
+// Where the rover is now its cameras see something else than at the start, which must not choose the rig again.
+TEST_F(RunLive, ResumedItKeepsTheRigThatItsFirstImagesHaveAligned) {
+  ProgramLimits limits;
+  limits.kill_after = std::chrono::milliseconds(1600);
+  run_live("live", {"--speed", "2", "--set", "commit.state_every_s=0.2"}, limits);
+  const std::string rig = read_file(path("live/rig.yaml")).value();
+  constexpr int kShifted = 2;  // rows
+  for (int i = 0; i < 14; ++i) {
+    const FrameImage right = read_image(image(1, i)).value();
+    Image<std::uint8_t> moved(right.width(), right.height());
+    for (int y = 0; y < moved.height(); ++y) {
+      const std::uint8_t* const from = right.as<std::uint8_t>().row(std::min(y + kShifted, moved.height() - 1));
+      std::copy_n(from, moved.width(), moved.row(y));
+    }
+    ASSERT_TRUE(write_png(image(1, i), moved));
+  }
+  const ProgramResult other = run_live("other", {"--speed", "50"});
+  ASSERT_NE(read_file(path("other/rig.yaml")).value(), rig) << "these images choose another rig";
+  const ProgramResult resumed = run_live("live", {"--speed", "10", "--set", "commit.state_every_s=0.2", "--resume"});
+  EXPECT_THAT(resumed.exit_code, ::testing::AnyOf(0, 6)) << resumed.err;  // rows of the moved images do not fit
+  EXPECT_EQ(read_file(path("live/rig.yaml")).value(), rig);
+  EXPECT_EQ(summary_of(path("live"))["frames"], 14);
+}
+
+TEST_F(RunLive, ResumedWithOtherOptionsItNamesThem) {
+  ASSERT_EQ(run_live("live", {"--speed", "20", "--max-frames", "5"}).exit_code, 0);
+  const ProgramResult resumed =
+      run_live("live", {"--speed", "20", "--set", "odometry.detection.landmarks=300", "--resume"});
+  EXPECT_EQ(resumed.exit_code, 4);
+  EXPECT_THAT(resumed.err, HasSubstr("odometry.detection.landmarks"));
 }
 
 TEST_F(RunLive, TheWatchdogNamesTheStageThatHangs) {

@@ -257,7 +257,10 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
                               const RunHooks& given_hooks) {
   const StreamInfo& info = source.stream.info();
   const ThreadPool workers(request.threads);
-  auto setup = set_up_run(source.stream, request, workers, source.pace());
+  const auto before = source.queue && request.resume ? RunStore::identity_of(RunFolder{request.output}.store())
+                                                     : Result<std::optional<RunIdentity>>();
+  if (!before) return failure(before);
+  auto setup = set_up_run(source.stream, request, workers, source.pace(), *before ? &**before : nullptr);
   if (!setup) return failure(setup);
   const Rig& rig = setup->rig;
   const RunOptions& options = setup->options;
@@ -273,7 +276,12 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   if (options.odometry_only) hooks.log.info("odometry only: no localization, no maps, no SLAM, no terrain");
   auto fingerprint = fingerprint_of(source);
   if (!fingerprint) return failure(fingerprint);
-  const RunIdentity identity{std::move(*fingerprint), dump_options(options), to_rig_yaml(rig)};
+  RunIdentity identity{std::move(*fingerprint), dump_options(options), to_rig_yaml(rig)};
+  if (source.queue) {
+    identity.given_options = dump_options(request.options);
+    identity.given_rig = to_rig_yaml(info.rig);
+    identity.ground_up = setup->ground_up;
+  }
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);

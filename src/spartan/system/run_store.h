@@ -1,6 +1,7 @@
 // RunStore: the SQLite database of a run, crash-safe (docs/reference/files.md).
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -71,6 +72,10 @@ struct RunIdentity {
   std::string input;    ///< fingerprint of the recording
   std::string options;  ///< config.yaml
   std::string rig;      ///< rig.yaml
+  /// Of a live run: `options` and `rig` before the first images of the stream completed them, which never come again.
+  /// Empty: a run of a recording.
+  std::string given_options{}, given_rig{};
+  std::optional<Eigen::Vector3d> ground_up{};  ///< by these images, body frame
 };
 
 /// Time that a run has taken, interrupted executions of the program included.
@@ -83,6 +88,8 @@ class RunStore {
  public:
   /// Whether the file contains a run; false if it is missing, or if the program ended before the first transaction.
   static Result<bool> contains_run(const std::string& path);
+  /// What identifies the run in a file; none where it does not contain one. Code `store_damaged`.
+  static Result<std::optional<RunIdentity>> identity_of(const std::string& path);
   /// Creates a store; replaces a file without a run. Code `output`.
   static Result<RunStore> create(const std::string& path, const RunIdentity& identity);
   /// Opens a store to resume its run from the latest checkpoint: records after it are removed, since the run makes them

@@ -48,9 +48,28 @@ std::string level_text(const Eigen::Vector3d& up_in_body) {
       std::abs(pitch), pitch >= 0 ? "down" : "up", std::abs(roll), roll >= 0 ? "right" : "left");
 }
 
+tl::unexpected<Error> damaged_identity(const std::string& store, const Error& error) {
+  return failure(ErrorCode::store_damaged, "is damaged: its rig or options cannot be read: " + error.what, store,
+                 "run again into a new folder");
+}
+
+// As before the run was interrupted.
+Result<RunSetup> set_up_again(const RunIdentity& before, const std::string& mask_folder, const std::string& store,
+                              const ThreadPool& workers) {
+  auto rig = parse_rig_yaml(before.rig, store);
+  if (!rig) return damaged_identity(store, rig.error());
+  auto options = parse_options<RunOptions>(before.options, store);
+  if (!options) return damaged_identity(store, options.error());
+  auto pipeline = Pipeline::create(*rig, *options, workers, mask_folder, Pace::live);
+  if (!pipeline) return failure(pipeline);
+  if (before.ground_up) pipeline->align_with_ground(*before.ground_up);
+  return RunSetup{std::move(*rig), std::move(*options), std::move(*pipeline), before.ground_up, {}};
+}
+
 }  // namespace
 
-Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers, Pace pace) {
+Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers, Pace pace,
+                            const RunIdentity* before) {
   const StreamInfo& info = source.info();
   const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
   RunOptions options = options_of(source, request);
@@ -59,6 +78,7 @@ Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, con
   if (Status fits = pipeline->check_memory(request.memory_bytes); !fits) return failure(fits);
   if (Status usable = check_run_folder({request.output}, request.resume || request.replace); !usable)
     return failure(usable);
+  if (before != nullptr) return set_up_again(*before, mask_folder, RunFolder{request.output}.store(), workers);
 
   AlignedRig aligned{info.rig, {}};
   if (options.align_rows && options.imaging.rectify) {

@@ -13,6 +13,7 @@
 #include "spartan/system/pipeline.h"
 #include "spartan/system/run.h"
 #include "spartan/system/run_options.h"
+#include "spartan/system/run_store.h"
 
 namespace spartan::internal {
 
@@ -24,8 +25,10 @@ struct RunSetup {
   std::vector<std::string> sentences;        ///< what was chosen, for the log
 };
 
-/// Checks that the run fits into memory and that its folder can be used before anything takes long. Codes: `usage`,
-/// `input`, `output`, `resources`.
-Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers, Pace pace);
+/// Checks that the run fits into memory and that its folder can be used before anything takes long. `before`: identity
+/// of the live run that is resumed, whose rig and options are used as they were chosen then; null: the first images
+/// choose. Codes: `usage`, `input`, `output`, `resources`, `store_damaged` (`before`).
+Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers, Pace pace,
+                            const RunIdentity* before);
 
 }  // namespace spartan::internal

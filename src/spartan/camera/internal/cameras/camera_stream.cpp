@@ -126,7 +126,8 @@ Status CameraStream::wait_for_previews() {
     if (missing == feeds_.end()) return {};
     if (Clock::now() >= until || all_ended()) {
       const auto& sources = (*missing)->sources;
-      const SourceCounts left = sources.front()->counts(0), right = sources.back()->counts(sources.size() == 1 ? 1 : 0);
+      const CameraReport left = sources.front()->camera_report(0),
+                         right = sources.back()->camera_report(sources.size() == 1 ? 1 : 0);
       return failure(ErrorCode::read_error,
                      fmt::format("pair {}: no frame within {:.0f} s ({} images by {}, {} by {})", (*missing)->pair.name,
                                  std::chrono::duration<double>(options_.first_wait).count(), left.images,
@@ -245,14 +246,14 @@ StereoFrame CameraStream::frame_of(const Feed& feed, const ImagePair& pair) cons
 Sample CameraStream::sample_of(Feed& feed, const ImagePair& pair) {
   StereoFrame frame = frame_of(feed, pair);
   frame.frame_id = next_frame_id_++;
-  if (auto missing = fault_of(feed, pair, frame)) {
-    missing->frame_id = frame.frame_id;
-    missing->pair = frame.pair;
-    missing->stamp = frame.left_stamp;
+  if (const auto fault = fault_of(feed, pair, frame)) {
+    ++(feed.report.*fault->count);
+    MissingFrame missing{frame.frame_id, frame.pair, frame.left_stamp, fault->kind, fault->message, {}};
     const bool one_image = frame.left.empty() != frame.right.empty();
-    if (one_image && missing->fault != FrameFault::stamp_reversed) missing->partial = std::move(frame);
-    return std::move(*missing);
+    if (one_image && fault->kind != FrameFault::stamp_reversed) missing.partial = std::move(frame);
+    return missing;
   }
+  feed.last_stamp = frame.left_stamp;
   ++feed.report.pairs;
   const double skew_ms = seconds_between(frame.left_stamp, frame.right_stamp) * 1e3;
   feed.skew_sum_ms += skew_ms;
@@ -267,51 +268,43 @@ std::string CameraStream::why_missing(const Feed& feed, std::size_t side) const 
                           : fmt::format("camera {} delivered no image at the time of the other one", camera);
 }
 
-// Why a frame cannot be delivered; none: it can.
-std::optional<MissingFrame> CameraStream::fault_of(Feed& feed, const ImagePair& pair, const StereoFrame& frame) const {
-  MissingFrame missing;
+std::optional<CameraStream::Fault> CameraStream::fault_of(const Feed& feed, const ImagePair& pair,
+                                                          const StereoFrame& frame) const {
   constexpr FrameFault kMissing[] = {FrameFault::left_missing, FrameFault::right_missing};
+  constexpr std::int64_t CameraPairReport::*kOtherAlone[] = {&CameraPairReport::right_alone,
+                                                             &CameraPairReport::left_alone};
   const std::string* const names[] = {&feed.pair.left, &feed.pair.right};
   for (std::size_t side = 0; side < 2; ++side) {
-    if (!pair.images[side]) {
-      ++(side == 0 ? feed.report.right_alone : feed.report.left_alone);
-      missing.fault = kMissing[side];
-      missing.message = why_missing(feed, side);
-      return missing;
+    if (!pair.images[side]) return Fault{kMissing[side], why_missing(feed, side), kOtherAlone[side]};
+  }
+  for (std::size_t side = 0; side < 2; ++side) {
+    if (pair.images[side]->image.image.empty()) {
+      return Fault{kMissing[side],
+                   fmt::format("the image of camera {} is not complete: packets were lost", *names[side]),
+                   &CameraPairReport::incomplete};
     }
   }
   for (std::size_t side = 0; side < 2; ++side) {
-    if (!pair.images[side]->image.image.empty()) continue;
-    ++feed.report.incomplete;
-    missing.fault = kMissing[side];
-    missing.message = fmt::format("the image of camera {} is not complete: packets were lost", *names[side]);
-    return missing;
-  }
-  for (std::size_t side = 0; side < 2; ++side) {
-    const FrameImage& image = pair.images[side]->image.image;
-    const ImageSize size = info_.rig.find_camera(*names[side])->size;
-    if (image.size() == size) continue;
-    ++feed.report.wrong_size;
-    missing.fault = FrameFault::wrong_size;
-    missing.message = fmt::format("camera {} delivers images of {} × {}, the rig has {} × {}", *names[side],
-                                  image.width(), image.height(), size.width, size.height);
-    return missing;
+    const ImageSize size = info_.rig.find_camera(*names[side])->size, is = pair.images[side]->image.image.size();
+    if (is != size) {
+      return Fault{FrameFault::wrong_size,
+                   fmt::format("camera {} delivers images of {} × {}, the rig has {} × {}", *names[side], is.width,
+                               is.height, size.width, size.height),
+                   &CameraPairReport::wrong_size};
+    }
   }
   if (feed.pairing.is_apart(pair)) {
-    ++feed.report.apart;
-    missing.fault = FrameFault::stamps_apart;
-    missing.message = fmt::format("the images of one trigger were taken {:.1f} ms apart",
-                                  1e3 * std::abs(seconds_between(frame.left_stamp, frame.right_stamp)));
-    return missing;
+    const double apart_ms = 1e3 * std::abs(seconds_between(frame.left_stamp, frame.right_stamp));
+    return Fault{FrameFault::stamps_apart,
+                 fmt::format("the images of one trigger were taken {:.1f} ms apart", apart_ms),
+                 &CameraPairReport::apart};
   }
   if (feed.last_stamp && frame.left_stamp <= *feed.last_stamp) {
-    ++feed.report.stamps_reversed;
-    missing.fault = FrameFault::stamp_reversed;
-    missing.message = fmt::format("its time is {:.6f} s before that of the frame before it",
-                                  seconds_between(frame.left_stamp, *feed.last_stamp));
-    return missing;
+    const double before_s = seconds_between(frame.left_stamp, *feed.last_stamp);
+    return Fault{FrameFault::stamp_reversed,
+                 fmt::format("its time is {:.6f} s before that of the frame before it", before_s),
+                 &CameraPairReport::stamps_reversed};
   }
-  feed.last_stamp = frame.left_stamp;
   return std::nullopt;
 }
 
@@ -362,14 +355,8 @@ std::vector<CameraPairReport> CameraStream::camera_reports() const {
     CameraPairReport report = feed->report;
     if (report.pairs > 0) report.mean_skew_ms = feed->skew_sum_ms / static_cast<double>(report.pairs);
     for (const auto& source : feed->sources) {
-      const auto& cameras = source->request().cameras;
-      for (std::size_t side = 0; side < cameras.size(); ++side) {
-        const SourceCounts counts = source->counts(side);
-        report.cameras.push_back({cameras[side]->name, counts.images, counts.incomplete, counts.not_received,
-                                  counts.duplicates, counts.reversed, counts.wrong_stamps, counts.triggers,
-                                  counts.unanswered, counts.untriggered, counts.losses, counts.clock_sigma_s * 1e3,
-                                  (counts.clock_rate - 1) * 1e6});
-      }
+      for (std::size_t side = 0; side < source->request().cameras.size(); ++side)
+        report.cameras.push_back(source->camera_report(side));
     }
     reports.push_back(std::move(report));
   }

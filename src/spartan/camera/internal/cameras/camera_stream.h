@@ -75,7 +75,13 @@ class CameraStream : public SampleStream, public CameraControl {
   void take_pair(Feed& feed, const ImagePair& pair);
   Sample sample_of(Feed& feed, const ImagePair& pair);
   StereoFrame frame_of(const Feed& feed, const ImagePair& pair) const;
-  std::optional<MissingFrame> fault_of(Feed& feed, const ImagePair& pair, const StereoFrame& frame) const;
+  // Why a frame cannot be delivered, and the count of such frames.
+  struct Fault {
+    FrameFault kind;
+    std::string message;
+    std::int64_t CameraPairReport::*count;
+  };
+  std::optional<Fault> fault_of(const Feed& feed, const ImagePair& pair, const StereoFrame& frame) const;
   std::string why_missing(const Feed& feed, std::size_t side) const;
   void push(Sample sample, std::chrono::steady_clock::time_point arrived);
   Status wait_for_previews();

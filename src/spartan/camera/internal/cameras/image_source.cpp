@@ -30,7 +30,10 @@ std::string DeviceRequest::names() const {
 }
 
 ImageSource::ImageSource(DeviceRequest request, OpenDevice open, const HostClock& clock, const Log& log)
-    : request_(std::move(request)), open_(std::move(open)), host_(clock), log_(log) {}
+    : request_(std::move(request)), open_(std::move(open)), host_(clock), log_(log) {
+  for (std::size_t side = 0; side < request_.cameras.size(); ++side)
+    reports_[side].camera = request_.cameras[side]->name;
+}
 
 Result<std::unique_ptr<ImageSource>> ImageSource::create(DeviceRequest request, OpenDevice open, const HostClock& clock,
                                                          const Log& log) {
@@ -75,9 +78,9 @@ bool ImageSource::is_lost() const {
   return device() == nullptr;
 }
 
-SourceCounts ImageSource::counts(std::size_t side) const {
+CameraReport ImageSource::camera_report(std::size_t side) const {
   const std::lock_guard lock(mutex_);
-  return counts_[side];
+  return reports_[side];
 }
 
 Status ImageSource::command(const std::function<void()>& note) {
@@ -144,7 +147,7 @@ Status ImageSource::send_trigger(CameraDevice& device, std::int64_t number) {
     // Before the trigger, so that an image which comes at once finds it.
     const std::lock_guard lock(mutex_);
     open_triggers_.push_back({number, now});
-    ++counts_[0].triggers;
+    ++reports_[0].triggers;
   }
   Status triggered = device.trigger();
   if (triggered) return {};
@@ -153,25 +156,25 @@ Status ImageSource::send_trigger(CameraDevice& device, std::int64_t number) {
                                  [&](const Trigger& trigger) { return trigger.number == number; });
   if (open != open_triggers_.end()) {
     open_triggers_.erase(open);
-    ++counts_[0].unanswered;
+    ++reports_[0].unanswered;
   }
   return triggered;
 }
 
 // The image belongs to the trigger that is nearest to its stamp, of those before its arrival; earlier ones have none.
 // The number of the trigger; −1: none.
-std::int64_t ImageSource::answer_trigger(SourceCounts& counts, Stamp stamp, Stamp arrival) {
+std::int64_t ImageSource::answer_trigger(CameraReport& report, Stamp stamp, Stamp arrival) {
   const auto end = std::find_if(open_triggers_.begin(), open_triggers_.end(),
                                 [&](const Trigger& trigger) { return trigger.time > arrival; });
   const auto answered = std::min_element(open_triggers_.begin(), end, [&](const Trigger& a, const Trigger& b) {
     return std::abs(seconds_between(stamp, a.time)) < std::abs(seconds_between(stamp, b.time));
   });
   if (answered == end) {
-    counts.untriggered += request_.driver().trigger == CameraDriver::kSoftware;
+    report.untriggered += request_.driver().trigger == CameraDriver::kSoftware;
     return -1;
   }
   const std::int64_t number = answered->number;
-  counts.unanswered += answered - open_triggers_.begin();
+  report.unanswered += answered - open_triggers_.begin();
   open_triggers_.erase(open_triggers_.begin(), answered + 1);
   return number;
 }
@@ -180,7 +183,7 @@ void ImageSource::give_up_triggers() {
   const std::lock_guard lock(mutex_);
   while (!open_triggers_.empty() && seconds_between(open_triggers_.front().time, host_.now()) > kAnswer_s) {
     open_triggers_.pop_front();
-    ++counts_[0].unanswered;
+    ++reports_[0].unanswered;
   }
 }
 
@@ -202,7 +205,7 @@ void ImageSource::run() {
           fmt::format("camera {} ({}): {}; trying again", request_.names(), request_.driver().source, read.reason));
       const std::lock_guard lock(mutex_);
       device_ = nullptr;
-      ++counts_[0].losses;
+      ++reports_[0].losses;
     }
   }
   ended_ = true;
@@ -232,12 +235,12 @@ void ImageSource::deliver(CameraImage image) {
   StampedImage stamped = this->stamped(std::move(image));
   {
     const std::lock_guard lock(mutex_);
-    SourceCounts& counts = counts_[static_cast<std::size_t>(side)];
-    ++(stamped.image.image.empty() ? counts.incomplete : counts.images);
-    stamped.trigger = answer_trigger(counts, stamped.stamp, host_.stamp_of(stamped.image.complete));
-    if (!stamped.trusted) ++counts.wrong_stamps;
-    counts.clock_sigma_s = stamped.sigma_s;
-    counts.clock_rate = clocks_[static_cast<std::size_t>(side)].rate();
+    CameraReport& report = reports_[static_cast<std::size_t>(side)];
+    ++(stamped.image.image.empty() ? report.incomplete : report.images);
+    stamped.trigger = answer_trigger(report, stamped.stamp, host_.stamp_of(stamped.image.complete));
+    if (!stamped.trusted) ++report.wrong_stamps;
+    report.clock_sigma_ms = 1e3 * stamped.sigma_s;
+    report.clock_rate_ppm = 1e6 * (clocks_[static_cast<std::size_t>(side)].rate() - 1);
   }
   deliver_(side, std::move(stamped));
 }
@@ -247,20 +250,20 @@ bool ImageSource::is_new(const CameraImage& image) {
   const std::size_t side = image.side == 0 ? 0 : 1;
   Last& last = last_[side];
   const std::lock_guard lock(mutex_);
-  SourceCounts& counts = counts_[side];
+  CameraReport& report = reports_[side];
   if (image.frame_id >= 0 && last.frame_id >= 0) {
     const std::int64_t step = image.frame_id - last.frame_id;
     if (step == 0) {
-      ++counts.duplicates;
+      ++report.duplicates;
       return false;
     }
     if (step < 0 && step > -kMostLeftOut) {
-      ++counts.reversed;
+      ++report.reversed;
       return false;
     }
-    if (step > 1 && step <= kMostLeftOut) counts.not_received += step - 1;
+    if (step > 1 && step <= kMostLeftOut) report.not_received += step - 1;
   } else if (image.camera_ns >= 0 && image.camera_ns == last.camera_ns) {
-    ++counts.duplicates;
+    ++report.duplicates;
     return false;
   }
   last = {image.frame_id, image.camera_ns};

@@ -19,6 +19,7 @@
 #include "spartan/camera/internal/cameras/camera_device.h"
 #include "spartan/camera/internal/cameras/image_pairing.h"
 #include "spartan/camera/internal/host_clock.h"
+#include "spartan/camera/sample_stream.h"
 #include "spartan/core/log.h"
 #include "spartan/core/result.h"
 #include "spartan/rig/rig.h"
@@ -33,20 +34,6 @@ struct DeviceRequest {
 };
 
 using OpenDevice = std::function<Result<std::unique_ptr<CameraDevice>>(const DeviceRequest&)>;
-
-/// What one camera of a device has delivered so far. Triggers and losses count for the first one.
-struct SourceCounts {
-  std::int64_t images = 0;                    ///< those that are complete
-  std::int64_t incomplete = 0;                ///< packets of them are missing
-  std::int64_t not_received = 0;              ///< left out in the count of the camera
-  std::int64_t duplicates = 0, reversed = 0;  ///< discarded: the same image again; an earlier one
-  std::int64_t wrong_stamps = 0;
-  std::int64_t triggers = 0;     ///< sent
-  std::int64_t unanswered = 0;   ///< triggers without an image
-  std::int64_t untriggered = 0;  ///< images without a trigger, or later than kAnswer_s, of a camera that is triggered
-  std::int64_t losses = 0;       ///< how often the camera no longer answered
-  double clock_sigma_s = 0, clock_rate = 1;
-};
 
 /// Opens a device, reads it on a thread, and opens it again each kRetry after it was lost. A second thread sends it its
 /// exposures and triggers; the times of triggers at a rate are the same for all devices with the same start.
@@ -75,8 +62,8 @@ class ImageSource {
   /// `number`: of the trigger, the same for both cameras of a pair, from kFirstCommanded on.
   Status trigger(std::int64_t number);
   Status set_exposure(const ExposureSettings& settings);
-  /// Of a camera of the request.
-  SourceCounts counts(std::size_t side) const;
+  /// Of a camera of the request. Triggers and losses count for the first one.
+  CameraReport camera_report(std::size_t side) const;
   const DeviceRequest& request() const { return request_; }
 
   static constexpr std::chrono::milliseconds kRetry{1000}, kPoll{50};
@@ -93,7 +80,7 @@ class ImageSource {
   void report(const Status& status);
   void deliver(CameraImage image);
   bool is_new(const CameraImage& image);
-  std::int64_t answer_trigger(SourceCounts& counts, Stamp stamp, Stamp arrival);
+  std::int64_t answer_trigger(CameraReport& report, Stamp stamp, Stamp arrival);
   void give_up_triggers();
   StampedImage stamped(CameraImage image);
   void keep_increasing(StampedImage& stamped, const CameraImage& image);
@@ -113,7 +100,7 @@ class ImageSource {
   std::shared_ptr<CameraDevice> device_;  // null: lost
   std::optional<ExposureSettings> exposure_, pending_exposure_;
   std::deque<std::int64_t> pending_triggers_;  // their numbers
-  std::array<SourceCounts, 2> counts_;         // by side
+  std::array<CameraReport, 2> reports_;        // by side
   struct Trigger {
     std::int64_t number = 0;
     Stamp time;
