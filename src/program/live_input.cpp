@@ -21,7 +21,7 @@ void add_live_options(CLI::App& command, LiveArguments& arguments) {
       ->check(CLI::PositiveNumber);
   command.add_option("--sensors", arguments.options.sensors,
                      "Of cameras: a FIFO, created if there is none, whose lines are samples of the other sensors: "
-                     "imu,STAMP_NS,… as in the tables of a recording; see the page on formats (default: none).");
+                     "imu,STAMP_NS,… with the columns of imu.csv of a recording, and so on (default: none).");
   command
       .add_option("--set-scenario", arguments.scenario_keys,
                   "Of a simulation: set one key of the scenario, e.g. rover=ordinary. Repeatable, in this order.")

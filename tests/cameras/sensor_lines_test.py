@@ -13,6 +13,7 @@ import contextlib
 import csv
 import json
 import math
+import os
 import pathlib
 import subprocess
 import sys
@@ -78,6 +79,13 @@ def make_rig(program, recording, images, rate_hz, folder):
     return rig, "gst:" + " ".join(pipeline)
 
 
+def open_to_write(path, flags):
+    """Fails where no run reads the FIFO, instead of waiting for one."""
+    file = os.open(path, flags & ~(os.O_CREAT | os.O_TRUNC) | os.O_NONBLOCK)
+    os.set_blocking(file, True)
+    return file
+
+
 def play(process, fifo, lines, rate_hz):
     """Writes the lines at their time after the first image of the pipeline, whose stamp is returned."""
     first = None
@@ -86,7 +94,8 @@ def play(process, fifo, lines, rate_hz):
             first = message["stamp_ns"] - 10**9 * message["frame_id"] // rate_hz
             break
     assert first is not None, "the run has no frame"
-    with contextlib.suppress(BrokenPipeError), open(fifo, "w", buffering=1) as out:  # until the images end
+    # Until the images end: then nobody reads the FIFO any more.
+    with contextlib.suppress(OSError), open(fifo, "w", buffering=1, opener=open_to_write) as out:
         out.write("wheels,nothing,1,2\n")  # harms no other
         for after_s, sensor, values in lines:
             stamp = first + int(1e9 * after_s)
@@ -112,7 +121,7 @@ def main():
     parser.add_argument("program")
     parser.add_argument("small_runs", type=pathlib.Path)
     parser.add_argument("--recording", type=pathlib.Path)
-    parser.add_argument("--rate", type=int, default=5)
+    parser.add_argument("--rate", type=int, default=2)
     parser.add_argument("--set", help="an option of the run, such as gravity_m_s2=3.71")
     arguments = parser.parse_args()
     recording = arguments.recording or arguments.small_runs / "drive"

@@ -14,7 +14,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const spartan::Stamp now{1'700'000'000'000'000'000};
   SensorLines lines("input", Eigen::Quaterniond::Identity());
   for (std::string_view left(reinterpret_cast<const char*>(data), size); !left.empty();) {
-    lines.add(left.substr(0, part), now);
+    lines.add(left.substr(0, part), {now, now});
     left.remove_prefix(std::min(part, left.size()));
   }
   while (const auto sample = lines.take()) {

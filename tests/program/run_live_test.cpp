@@ -246,6 +246,10 @@ TEST_F(RunLive, ResumedWithOtherOptionsItNamesThem) {
       run_live("live", {"--speed", "20", "--set", "odometry.detection.landmarks=300", "--resume"});
   EXPECT_EQ(resumed.exit_code, 4);
   EXPECT_THAT(resumed.err, HasSubstr("odometry.detection.landmarks"));
+  // Given, the default is not what the first images chose.
+  const ProgramResult given = run_live("live", {"--speed", "20", "--set", "mapping.map.cell_m=0.05", "--resume"});
+  EXPECT_EQ(given.exit_code, 4);
+  EXPECT_THAT(given.err, HasSubstr("now 'mapping.map.cell_m terrain.every_m'"));
 }
 
 TEST_F(RunLive, TheWatchdogNamesTheStageThatHangs) {

@@ -29,9 +29,17 @@ StreamResult open_cameras(const std::string& address, const std::string& rig_fil
   info.name = std::filesystem::path(rig_file).stem().string();
   internal::CameraStreamOptions camera_options;
   camera_options.pair_tolerance_s = open.pair_tolerance_s;
+  std::unique_ptr<internal::SensorLineReader> lines;
+  if (!options.sensors.empty()) {
+    auto opened =
+        internal::SensorLineReader::open(options.sensors, info.rig.imu.body_from_imu.rotation(), camera_options.clock);
+    if (!opened) return failure(opened);
+    lines = std::move(*opened);
+  }
   auto cameras = internal::CameraStream::create(info, internal::open_plugin_camera, camera_options, options.log);
-  if (!cameras || options.sensors.empty()) return cameras;
-  return internal::SensorLineStream::open(std::move(*cameras), options.sensors);
+  if (!cameras) return failure(cameras);
+  if (!lines) return std::move(*cameras);
+  return std::make_unique<internal::SensorLineStream>(std::move(*cameras), std::move(lines));
 }
 
 // The sources of the left and the right camera in an address: the ids of two cameras, or one pipeline.

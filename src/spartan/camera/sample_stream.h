@@ -168,7 +168,7 @@ struct LiveOptions {
   int passes = 1;    ///< how often a recording is played
   Log log = {};      ///< of cameras that are lost and found again
   /// Of cameras: path of a FIFO, created if there is none, from which samples of the other sensors are read
-  /// (internal/sensor_lines.h, docs/reference/formats); empty: there are none.
+  /// (docs/reference/recording.md, sensor lines); empty: there are none.
   std::string sensors = {};
 };
 

@@ -41,7 +41,10 @@ struct StreamRecorder::State {
 
 Result<std::unique_ptr<StreamRecorder>> StreamRecorder::create(const std::string& folder, const StreamInfo& info,
                                                                ImageFiles images) {
-  auto writer = RecordingWriter::create_batched(folder, info.rig, recording_options_of(info), images);
+  // Samples of the IMU are in the axes of the body; a recording would rotate them again.
+  Rig rig = info.rig;
+  rig.imu.body_from_imu = Pose::from_translation(rig.imu.body_from_imu.translation());
+  auto writer = RecordingWriter::create_batched(folder, rig, recording_options_of(info), images);
   if (!writer) return failure(writer);
   return std::unique_ptr<StreamRecorder>(new StreamRecorder(std::make_unique<State>(std::move(*writer))));
 }

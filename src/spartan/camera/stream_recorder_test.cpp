@@ -12,6 +12,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "spartan/camera/recording.h"
@@ -90,6 +91,24 @@ INSTANTIATE_TEST_SUITE_P(ImageFiles, StreamRecorderTest, ::testing::Values(Image
                          [](const auto& files) { return files.param == ImageFiles::png ? "Png" : "Pnm"; });
 
 // A frame is listed only after its images are on disk.
+// Its samples are in the axes of the body; the rig of the stream says how those of the readings are turned.
+TEST(StreamRecorder, TheImuIsReadBackAsItCame) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/recording";
+  StreamInfo info = tiny_stream();
+  info.rig.imu.body_from_imu =
+      Pose(Eigen::Quaterniond(Eigen::AngleAxisd(1.2, Eigen::Vector3d(1, 2, 3).normalized())), {0.1, 0.2, 0.3});
+  auto recorder = StreamRecorder::create(path, info, ImageFiles::pnm).value();
+  recorder->add(ImuSample{Stamp{1}, {0.1, 0.2, 0.3}, {1, 2, 9.8}});
+  recorder->add(tiny_frame(0));
+  ASSERT_TRUE(recorder->finish());
+  const auto recording = open_recording(path).value();
+  const auto imu = std::get<ImuSample>(*recording->next().value());
+  EXPECT_EQ(imu.gyro_rad_s, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(imu.accel_m_s2, Eigen::Vector3d(1, 2, 9.8));
+  EXPECT_EQ(recording->info().rig.imu.body_from_imu.translation(), info.rig.imu.body_from_imu.translation());
+}
+
 TEST(BatchedRecording, ListsFramesAtTheNextSync) {
   const TemporaryFolder folder;
   const std::string path = folder.path() + "/recording";

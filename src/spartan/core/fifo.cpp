@@ -1,6 +1,7 @@
 #include "spartan/core/fifo.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -36,7 +37,9 @@ Fifo::~Fifo() {
   if (file_ >= 0) ::close(file_);
 }
 
-std::size_t Fifo::read(std::span<char> bytes) {
+std::size_t Fifo::read(std::span<char> bytes, std::chrono::milliseconds timeout) {
+  pollfd file{file_, POLLIN, 0};
+  if (timeout.count() > 0) static_cast<void>(::poll(&file, 1, static_cast<int>(timeout.count())));
   const ssize_t n = ::read(file_, bytes.data(), bytes.size());
   return n > 0 ? static_cast<std::size_t>(n) : 0;
 }

@@ -1,6 +1,7 @@
 // Reading end of a FIFO: bytes that other programs write now.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -18,8 +19,8 @@ class Fifo {
   Fifo& operator=(Fifo&& other) noexcept;
   ~Fifo();
 
-  /// Number of bytes that were there, at most those of `bytes`. Does not wait.
-  std::size_t read(std::span<char> bytes);
+  /// Number of bytes that were there, at most those of `bytes`. Waits for the first one, at most for `timeout`.
+  std::size_t read(std::span<char> bytes, std::chrono::milliseconds timeout = {});
 
  private:
   explicit Fifo(int file) : file_(file) {}

@@ -91,6 +91,7 @@ class GivenKeys {
   void add(std::string key) { keys_.insert(std::move(key)); }
   void add(const GivenKeys& other) { keys_.insert(other.keys_.begin(), other.keys_.end()); }
   bool contains(const std::string& key) const { return keys_.contains(key); }
+  const std::set<std::string>& keys() const { return keys_; }
   /// The keys inside a group, without its name.
   GivenKeys in_group(std::string_view group) const;
 

@@ -388,6 +388,9 @@ bool Pipeline::maps_a_stop() const {
 const RunningStage& Pipeline::back_end_stage() const {
   return state_->back_end.running();
 }
+void Pipeline::stop_back_end() {
+  state_->back_end.stop();
+}
 const std::string& Pipeline::odometry_pair() const {
   return state_->pair.name;
 }

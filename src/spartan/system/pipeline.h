@@ -163,6 +163,8 @@ class Pipeline {
   bool maps_a_stop() const;
   /// The job of the back end that runs now.
   const RunningStage& back_end_stage() const;
+  /// Ends what the back end computes; nothing may be added any more. What was pending is in save().
+  void stop_back_end();
 
   /// Name of the pair that drives the odometry.
   const std::string& odometry_pair() const;

@@ -1,11 +1,13 @@
 #include "spartan/system/run.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <new>
 #include <optional>
 #include <utility>
@@ -54,10 +56,12 @@ struct RunSource {
 Result<std::vector<std::unique_ptr<Recording>>> recordings_of(const RunFolder& folder, const StreamInfo& info,
                                                               const Log& log) {
   std::vector<std::unique_ptr<Recording>> recordings;
+  OpenOptions accepted;  // the stream has paired its images
+  accepted.pair_tolerance_s = std::numeric_limits<double>::infinity();
   std::error_code error;
   for (int i = 1; std::filesystem::exists(folder.recording(i), error); ++i) {
     if (Status s = finish_interrupted_recording(folder.recording(i), info); !s) return failure(s);
-    auto recording = open_recording(folder.recording(i));
+    auto recording = open_recording(folder.recording(i), accepted);
     // Such as one that was interrupted before it listed a frame.
     if (!recording && recording.error().code == ErrorCode::input) {
       log.warning("a recording of this run is not processed: " + recording.error().message());
@@ -236,8 +240,7 @@ void end_recording(QueuedStream& queue, const Log& log) {
 // What follows takes longer the longer the run was, and can be done again with --resume or `spartan export`.
 void report_stop(const RunLoop& run_loop, const Log& log) {
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - run_loop.stop_time();
-  log.info(fmt::format("stopped: all results are committed after {:.2f} s; trajectories, map and summary are written",
-                       since.count()));
+  log.info(fmt::format("stopped: all results are committed after {:.2f} s; writing the other files", since.count()));
 }
 
 // A live stream is never the same twice.
@@ -246,6 +249,16 @@ Result<std::string> fingerprint_of(const RunSource& source) {
   const auto listing = source.recording->listing_hash();
   if (!listing) return failure(listing);
   return fmt::format("{:016x}", *listing);
+}
+
+// The live run that is to be resumed. None: there is none, or it is another one, which opening its store says.
+Result<std::optional<RunIdentity>> live_run_before(const StreamInfo& info, const std::string& output) {
+  const RunFolder folder{output};
+  if (Status free = check_run_folder(folder, true); !free) return failure(free);
+  auto before = RunStore::identity_of(folder.store());
+  if (!before) return failure(before);
+  const bool is_this = *before && (*before)->input == info.path && !(*before)->given_rig.empty();
+  return is_this ? std::move(*before) : std::nullopt;
 }
 
 struct RunStart {
@@ -257,8 +270,8 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
                               const RunHooks& given_hooks) {
   const StreamInfo& info = source.stream.info();
   const ThreadPool workers(request.threads);
-  const auto before = source.queue && request.resume ? RunStore::identity_of(RunFolder{request.output}.store())
-                                                     : Result<std::optional<RunIdentity>>();
+  const auto before =
+      source.queue && request.resume ? live_run_before(info, request.output) : Result<std::optional<RunIdentity>>();
   if (!before) return failure(before);
   auto setup = set_up_run(source.stream, request, workers, source.pace(), *before ? &**before : nullptr);
   if (!setup) return failure(setup);
@@ -280,6 +293,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   if (source.queue) {
     identity.given_options = dump_options(request.options);
     identity.given_rig = to_rig_yaml(info.rig);
+    identity.given_keys = fmt::format("{}", fmt::join(request.given.keys(), " "));
     identity.ground_up = setup->ground_up;
   }
   auto store = open_store(request, folder, identity);

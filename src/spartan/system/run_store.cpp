@@ -21,7 +21,8 @@ constexpr int kPageBytes = 512;  // a frame adds about 0.5 kB to each of six tab
 // as the state of the pipeline, is copied once. With 16 MB no byte less is written, but the end of a run copies them.
 constexpr int kLogPages = 4096;
 // Keys of the table `identity`.
-constexpr const char *kGivenOptions = "given_options", *kGivenRig = "given_rig", *kGroundUp = "ground_up";
+constexpr const char *kGivenOptions = "given_options", *kGivenRig = "given_rig", *kGivenKeys = "given_keys",
+                     *kGroundUp = "ground_up";
 constexpr int kApplicationId = 0x5350544E;  // "SPTN"
 constexpr int kUserVersion = 3, kOldestReadableVersion = 2;
 
@@ -121,6 +122,7 @@ Status write_given(Database& db, const RunIdentity& identity) {
   if (identity.given_rig.empty()) return {};
   if (Status s = write_identity(db, kGivenOptions, identity.given_options); !s) return s;
   if (Status s = write_identity(db, kGivenRig, identity.given_rig); !s) return s;
+  if (Status s = write_identity(db, kGivenKeys, identity.given_keys); !s) return s;
   if (!identity.ground_up) return {};
   const Eigen::Vector3d& up = *identity.ground_up;
   return write_identity(db, kGroundUp, fmt::format("{} {} {}", up.x(), up.y(), up.z()));
@@ -130,7 +132,7 @@ std::optional<Eigen::Vector3d> vector_of(const std::string& text) {
   std::istringstream in(text);
   Eigen::Vector3d vector;
   in >> vector.x() >> vector.y() >> vector.z();
-  return in && vector.allFinite() ? std::optional(vector) : std::nullopt;
+  return in && vector.allFinite() && vector.norm() > 0 ? std::optional(vector) : std::nullopt;
 }
 
 Status expect_identity(Database& db, const std::string& key, const std::string& value, std::string what) {
@@ -149,6 +151,7 @@ Status expect_identity(Database& db, const std::string& key, const std::string& 
       what += ": " + differences;
     }
   }
+  if (*row && key == kGivenKeys) what += fmt::format(": '{}', now '{}'", select->text(0), value);
   return failure(ErrorCode::configuration, "was written by a run with " + what, db.path(),
                  "resume with the same input, rig and options, or run into a new folder");
 }
@@ -362,9 +365,18 @@ Result<std::optional<RunIdentity>> RunStore::identity_of(const std::string& path
     return Status();
   });
   if (!read) return failure(read);
-  RunIdentity identity{values["input"], values["options"], values["rig"], values[kGivenOptions], values[kGivenRig], {}};
-  if (values.contains(kGroundUp)) identity.ground_up = vector_of(values[kGroundUp]);
-  return identity;
+  RunIdentity identity{values["input"],
+                       values["options"],
+                       values["rig"],
+                       values[kGivenOptions],
+                       values[kGivenRig],
+                       values[kGivenKeys],
+                       {}};
+  if (!values.contains(kGroundUp)) return identity;
+  identity.ground_up = vector_of(values[kGroundUp]);
+  if (identity.ground_up) return identity;
+  return failure(ErrorCode::store_damaged, "is damaged: table 'identity': 'ground_up' is no direction", path,
+                 "run again into a new folder");
 }
 
 Result<RunStore> RunStore::create(const std::string& path, const RunIdentity& identity) {
@@ -393,6 +405,7 @@ Result<RunStore> RunStore::resume(const std::string& path, const RunIdentity& id
   if (!identity.given_rig.empty()) {
     if (Status s = expect_identity(*db, kGivenRig, identity.given_rig, "another rig"); !s) return failure(s);
     if (Status s = expect_identity(*db, kGivenOptions, identity.given_options, "other options"); !s) return failure(s);
+    if (Status s = expect_identity(*db, kGivenKeys, identity.given_keys, "other options given"); !s) return failure(s);
   }
   if (Status s = expect_identity(*db, "rig", identity.rig, "another rig"); !s) return failure(s);
   if (Status s = expect_identity(*db, "options", identity.options, "other options"); !s) return failure(s);

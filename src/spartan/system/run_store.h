@@ -75,6 +75,7 @@ struct RunIdentity {
   /// Of a live run: `options` and `rig` before the first images of the stream completed them, which never come again.
   /// Empty: a run of a recording.
   std::string given_options{}, given_rig{};
+  std::string given_keys{};  ///< of the options that the user gave: a default that was given is not completed
   std::optional<Eigen::Vector3d> ground_up{};  ///< by these images, body frame
 };
 
@@ -88,7 +89,7 @@ class RunStore {
  public:
   /// Whether the file contains a run; false if it is missing, or if the program ended before the first transaction.
   static Result<bool> contains_run(const std::string& path);
-  /// What identifies the run in a file; none where it does not contain one. Code `store_damaged`.
+  /// What identifies the run in a file; none where it does not contain one. Codes as open_read_only().
   static Result<std::optional<RunIdentity>> identity_of(const std::string& path);
   /// Creates a store; replaces a file without a run. Code `output`.
   static Result<RunStore> create(const std::string& path, const RunIdentity& identity);

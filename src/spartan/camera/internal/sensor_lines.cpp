@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <utility>
+#include <variant>
 
 #include "spartan/camera/internal/table.h"
 
@@ -16,7 +17,7 @@ SensorLines::SensorLines(std::string name, const Eigen::Quaterniond& body_from_i
                 {"compass", 3, read_compass_row},
                 {"inclinometer", 4, read_inclinometer_row}}} {}
 
-void SensorLines::add(std::string_view bytes, Stamp now) {
+void SensorLines::add(std::string_view bytes, const Arrival& arrival) {
   for (;;) {
     const std::size_t end = bytes.find('\n');
     received_.append(bytes.substr(0, end));
@@ -25,7 +26,7 @@ void SensorLines::add(std::string_view bytes, Stamp now) {
       received_.resize(kLongestLine);
     }
     if (end == std::string_view::npos) return;
-    add_line(received_, now);
+    add_line(received_, arrival);
     received_.clear();
     is_too_long_ = false;
     bytes.remove_prefix(end + 1);
@@ -39,7 +40,7 @@ std::optional<Sample> SensorLines::take() {
   return sample;
 }
 
-void SensorLines::add_line(std::string_view line, Stamp now) {
+void SensorLines::add_line(std::string_view line, const Arrival& arrival) {
   if (is_too_long_) return discard(line, "the line is too long");
   std::vector<std::string_view> fields = split(line, ',');
   if (fields.size() == 1 && fields.front().empty()) return;
@@ -49,7 +50,7 @@ void SensorLines::add_line(std::string_view line, Stamp now) {
   fields.erase(fields.begin());
   if (fields.size() < sensor->fields)
     return discard(line, fmt::format("{} values, expected {}", fields.size(), sensor->fields));
-  auto sample = sample_of(*sensor, std::move(fields), now);
+  auto sample = sample_of(*sensor, std::move(fields), arrival);
   if (!sample) return discard(line, sample.error().what);
   if (sensor->last && stamp_of(*sample) <= *sensor->last) {
     ++discarded_.reversed;
@@ -57,16 +58,27 @@ void SensorLines::add_line(std::string_view line, Stamp now) {
   }
   sensor->last = stamp_of(*sample);
   samples_.push_back(std::move(*sample));
+  if (samples_.size() <= kMostWaiting) return;
+  samples_.pop_front();
+  discard(line, fmt::format("{} samples wait, the oldest one is discarded", kMostWaiting));
 }
 
-Result<Sample> SensorLines::sample_of(Sensor& sensor, std::vector<std::string_view> row, Stamp now) {
-  const std::string arrival = std::to_string(now.ns);
-  if (row.front().empty()) row.front() = arrival;
+Result<Sample> SensorLines::sample_of(const Sensor& sensor, std::vector<std::string_view> row,
+                                      const Arrival& arrival) const {
+  const std::string system = std::to_string(arrival.system.ns);
+  if (row.front().empty()) row.front() = system;
   auto sample = sensor.read_row(row);
   if (!sample) return sample;
-  const double off_s = seconds_between(now, stamp_of(*sample));
-  if (off_s <= kAhead_s && off_s >= -kLate_s) return sample;
-  return failure(ErrorCode::input, fmt::format("its stamp is {:.3g} s off the clock of this computer", off_s));
+  const double off_s = seconds_between(arrival.system, stamp_of(*sample));
+  if (off_s > kAhead_s || off_s < -kLate_s)
+    return failure(ErrorCode::input, fmt::format("its stamp is {:.3g} s off the clock of this computer", off_s));
+  const std::int64_t host_minus_system = arrival.host.ns - arrival.system.ns;
+  std::visit(
+      [&](auto& of) {
+        if constexpr (requires { of.stamp.ns; }) of.stamp.ns += host_minus_system;
+      },
+      *sample);
+  return sample;
 }
 
 void SensorLines::discard(std::string_view line, const std::string& why) {

@@ -16,8 +16,8 @@
 namespace spartan::internal {
 
 /// The samples of another stream through a SampleQueue. The thread starts with the first call of read(); its end is
-/// awaited in the destructor, which takes as long as a read of `kPoll`. discarded()
-/// is that of the stream only after the end.
+/// awaited in the destructor, which takes as long as a read of `kPoll`. Only after the end is
+/// discarded() that of the stream.
 class QueuedStream : public StreamDecorator {
  public:
   QueuedStream(SampleStream& stream, const std::string& odometry_pair, std::size_t most_bytes)

@@ -135,6 +135,7 @@ Status RunLoop::process_samples() {
     add_checkpoint(last);
     if (Status added = recorder_->add(std::move(last)); !added) return added;
   }
+  if (stopped_) pipeline_.stop_back_end();
   // What was computed before an error is kept.
   const Status flushed = recorder_->flush();
   return processed ? flushed : processed;

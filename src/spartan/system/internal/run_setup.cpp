@@ -48,8 +48,9 @@ std::string level_text(const Eigen::Vector3d& up_in_body) {
       std::abs(pitch), pitch >= 0 ? "down" : "up", std::abs(roll), roll >= 0 ? "right" : "left");
 }
 
-tl::unexpected<Error> damaged_identity(const std::string& store, const Error& error) {
-  return failure(ErrorCode::store_damaged, "is damaged: its rig or options cannot be read: " + error.what, store,
+// Damaged, or of another version.
+tl::unexpected<Error> unreadable_identity(const std::string& store, const Error& error) {
+  return failure(ErrorCode::configuration, "has a rig or options that this version cannot read: " + error.what, store,
                  "run again into a new folder");
 }
 
@@ -57,9 +58,9 @@ tl::unexpected<Error> damaged_identity(const std::string& store, const Error& er
 Result<RunSetup> set_up_again(const RunIdentity& before, const std::string& mask_folder, const std::string& store,
                               const ThreadPool& workers) {
   auto rig = parse_rig_yaml(before.rig, store);
-  if (!rig) return damaged_identity(store, rig.error());
+  if (!rig) return unreadable_identity(store, rig.error());
   auto options = parse_options<RunOptions>(before.options, store);
-  if (!options) return damaged_identity(store, options.error());
+  if (!options) return unreadable_identity(store, options.error());
   auto pipeline = Pipeline::create(*rig, *options, workers, mask_folder, Pace::live);
   if (!pipeline) return failure(pipeline);
   if (before.ground_up) pipeline->align_with_ground(*before.ground_up);

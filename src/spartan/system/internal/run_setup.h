@@ -27,7 +27,7 @@ struct RunSetup {
 
 /// Checks that the run fits into memory and that its folder can be used before anything takes long. `before`: identity
 /// of the live run that is resumed, whose rig and options are used as they were chosen then; null: the first images
-/// choose. Codes: `usage`, `input`, `output`, `resources`, `store_damaged` (`before`).
+/// choose. Codes: `usage`, `input`, `output`, `resources`, `configuration` (also of `before`).
 Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers, Pace pace,
                             const RunIdentity* before);
 

@@ -24,7 +24,7 @@ bool has_driver(const Rig& rig, const std::string& camera) {
 }  // namespace
 
 CameraStream::CameraStream(const StreamInfo& info, const CameraStreamOptions& options, const Log& log)
-    : info_(info), options_(options), log_(log) {}
+    : info_(info), options_(options), log_(log), clock_(options.clock) {}
 
 CameraStream::~CameraStream() {
   const std::lock_guard lock(mutex_);

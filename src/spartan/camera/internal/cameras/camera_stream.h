@@ -25,6 +25,7 @@ struct CameraStreamOptions {
   double pair_tolerance_s = 0.005;              ///< as in OpenOptions
   std::chrono::milliseconds pair_wait{200};     ///< for the other image of a pair, and for that of a trigger
   std::chrono::milliseconds first_wait{10000};  ///< for the first frame of each pair
+  HostClock clock{};                            ///< of the stamps
 };
 
 /// The pairs of a rig whose cameras have drivers. An image without a partner, and a trigger without an image, come as
