@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "spartan/core/fifo.h"
+#include "spartan/core/files.h"
 #include "spartan/core/log.h"
 #include "spartan/core/result.h"
 #include "spartan/system/run.h"

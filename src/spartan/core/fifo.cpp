@@ -1,5 +1,3 @@
-#include "spartan/core/fifo.h"
-
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/stat.h>
@@ -8,6 +6,8 @@
 #include <cerrno>
 #include <system_error>
 #include <utility>
+
+#include "spartan/core/files.h"
 
 namespace spartan {
 

@@ -1,6 +1,7 @@
-// Reading files, writing them atomically, and owning a folder.
+// Reading files and FIFOs, writing files atomically, and owning a folder.
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -136,6 +137,24 @@ class ReplacedFolder {
   ReplacedFolder(std::string path, std::string aside) : path_(std::move(path)), aside_(std::move(aside)) {}
   void restore();
   std::string path_, aside_;
+};
+
+/// Reading end of a FIFO: bytes that other programs write now. Writers may come and go; there is no end.
+class Fifo {
+ public:
+  /// Creates the FIFO where there is none. Code `output`: it cannot be created or opened, or is no FIFO.
+  static Result<Fifo> open(const std::string& path);
+  Fifo(Fifo&& other) noexcept;
+  Fifo& operator=(Fifo&& other) noexcept;
+  ~Fifo();
+
+  /// Number of bytes that were there, at most those of `bytes`. Waits for the first one, at most for `timeout`.
+  std::size_t read(std::span<char> bytes, std::chrono::milliseconds timeout = {});
+
+ private:
+  explicit Fifo(int file) : file_(file) {}
+
+  int file_ = -1;
 };
 
 }  // namespace spartan

@@ -11,8 +11,8 @@
 
 #include "spartan/camera/internal/host_clock.h"
 #include "spartan/camera/internal/sensor_lines.h"
-#include "spartan/camera/stream_decorator.h"
-#include "spartan/core/fifo.h"
+#include "spartan/camera/sample_stream.h"
+#include "spartan/core/files.h"
 
 namespace spartan::internal {
 

@@ -14,7 +14,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "spartan/camera/stream_decorator.h"
+#include "spartan/camera/sample_stream.h"
 #include "spartan/core/log.h"
 #include "spartan/rig/rig.h"
 #include "spartan/system/internal/stationary_check.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "spartan/camera/recording_writer.h"
-#include "spartan/camera/stream_decorator.h"
+#include "spartan/camera/sample_stream.h"
 #include "spartan/system/internal/sample_queue.h"
 
 namespace spartan::internal {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "spartan/camera/recording.h"
-#include "spartan/camera/stream_decorator.h"
+#include "spartan/camera/sample_stream.h"
 
 namespace spartan::internal {
 
