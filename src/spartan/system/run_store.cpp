@@ -3,15 +3,12 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <map>
-#include <sstream>
 #include <string>
 #include <utility>
 
-#include "spartan/core/options.h"
 #include "spartan/storage/database.h"
+#include "spartan/system/internal/run_identity.h"
 #include "spartan/system/internal/run_store_state.h"
-#include "spartan/system/run_options.h"
 
 namespace spartan {
 namespace {
@@ -20,9 +17,6 @@ constexpr int kPageBytes = 512;  // a frame adds about 0.5 kB to each of six tab
 // Pages in the write-ahead log that are copied into the database at once (2 MB): what is written again and again, such
 // as the state of the pipeline, is copied once. With 16 MB no byte less is written, but the end of a run copies them.
 constexpr int kLogPages = 4096;
-// Keys of the table `identity`.
-constexpr const char *kGivenOptions = "given_options", *kGivenRig = "given_rig", *kGivenKeys = "given_keys",
-                     *kGroundUp = "ground_up";
 constexpr int kApplicationId = 0x5350544E;  // "SPTN"
 constexpr int kUserVersion = 3, kOldestReadableVersion = 2;
 
@@ -109,51 +103,6 @@ Status check_version(Database& db) {
                    db.path(), "run again into a new folder");
   }
   return {};
-}
-
-Status write_identity(Database& db, const std::string& key, const std::string& value) {
-  auto insert = db.prepare("INSERT INTO identity VALUES (?, ?)");
-  if (!insert) return failure(insert);
-  return insert->bind(1, key).bind(2, value).run();
-}
-
-// Of a live run.
-Status write_given(Database& db, const RunIdentity& identity) {
-  if (identity.given_rig.empty()) return {};
-  if (Status s = write_identity(db, kGivenOptions, identity.given_options); !s) return s;
-  if (Status s = write_identity(db, kGivenRig, identity.given_rig); !s) return s;
-  if (Status s = write_identity(db, kGivenKeys, identity.given_keys); !s) return s;
-  if (!identity.ground_up) return {};
-  const Eigen::Vector3d& up = *identity.ground_up;
-  return write_identity(db, kGroundUp, fmt::format("{} {} {}", up.x(), up.y(), up.z()));
-}
-
-std::optional<Eigen::Vector3d> vector_of(const std::string& text) {
-  std::istringstream in(text);
-  Eigen::Vector3d vector;
-  in >> vector.x() >> vector.y() >> vector.z();
-  return in && vector.allFinite() && vector.norm() > 0 ? std::optional(vector) : std::nullopt;
-}
-
-Status expect_identity(Database& db, const std::string& key, const std::string& value, std::string what) {
-  auto select = db.prepare("SELECT value FROM identity WHERE key = ?");
-  if (!select) return failure(select);
-  select->bind(1, key);
-  const auto row = select->step();
-  if (!row) return failure(row);
-  if (*row && select->text(0) == value) return {};
-  if (*row && (key == "options" || key == kGivenOptions)) {
-    const auto before = parse_options<RunOptions>(select->text(0), db.path()),
-               now = parse_options<RunOptions>(value, key);
-    if (before && now) {
-      const std::string differences = option_differences(*before, *now);
-      if (differences.empty()) return {};  // only descriptions differ
-      what += ": " + differences;
-    }
-  }
-  if (*row && key == kGivenKeys) what += fmt::format(": '{}', now '{}'", select->text(0), value);
-  return failure(ErrorCode::configuration, "was written by a run with " + what, db.path(),
-                 "resume with the same input, rig and options, or run into a new folder");
 }
 
 }  // namespace
@@ -355,28 +304,11 @@ Result<std::optional<RunIdentity>> RunStore::identity_of(const std::string& path
   const auto there = contains_run(path);
   if (!there) return failure(there);
   if (!*there) return std::nullopt;
-  auto db = Database::open(path, Database::Mode::read_only);
-  if (!db) return failure(db);
-  if (Status s = check_version(*db); !s) return failure(s);
-  if (Status s = db->expect_tables(kSchema); !s) return failure(s);
-  std::map<std::string, std::string> values;
-  Status read = for_each_row(*db, "SELECT key, value FROM identity", [&](const SqlStatement& row) {
-    values[row.text(0)] = row.text(1);
-    return Status();
-  });
-  if (!read) return failure(read);
-  RunIdentity identity{values["input"],
-                       values["options"],
-                       values["rig"],
-                       values[kGivenOptions],
-                       values[kGivenRig],
-                       values[kGivenKeys],
-                       {}};
-  if (!values.contains(kGroundUp)) return identity;
-  identity.ground_up = vector_of(values[kGroundUp]);
-  if (identity.ground_up) return identity;
-  return failure(ErrorCode::store_damaged, "is damaged: table 'identity': 'ground_up' is no direction", path,
-                 "run again into a new folder");
+  const auto store = open_read_only(path);
+  if (!store) return failure(store);
+  auto identity = internal::read_identity(store->state_->db);
+  if (!identity) return failure(identity);
+  return std::move(*identity);
 }
 
 Result<RunStore> RunStore::create(const std::string& path, const RunIdentity& identity) {
@@ -385,10 +317,7 @@ Result<RunStore> RunStore::create(const std::string& path, const RunIdentity& id
   const std::string header =
       fmt::format("PRAGMA application_id={}; PRAGMA user_version={};", kApplicationId, kUserVersion);
   if (Status s = db->execute("BEGIN;" + header + kSchema); !s) return failure(s);
-  if (Status s = write_identity(*db, "input", identity.input); !s) return failure(s);
-  if (Status s = write_identity(*db, "options", identity.options); !s) return failure(s);
-  if (Status s = write_identity(*db, "rig", identity.rig); !s) return failure(s);
-  if (Status s = write_given(*db, identity); !s) return failure(s);
+  if (Status s = internal::write_identity(*db, identity); !s) return failure(s);
   if (const auto tiles = TileStore::open(*db); !tiles) return failure(tiles);
   if (Status s = db->execute("COMMIT"); !s) return failure(s);
   auto state = std::make_unique<State>(std::move(*db));
@@ -401,14 +330,7 @@ Result<RunStore> RunStore::resume(const std::string& path, const RunIdentity& id
   if (!db) return failure(db);
   if (Status s = check_version(*db); !s) return failure(s);
   if (Status s = db->expect_tables(kSchema); !s) return failure(s);
-  if (Status s = expect_identity(*db, "input", identity.input, "another input"); !s) return failure(s);
-  if (!identity.given_rig.empty()) {
-    if (Status s = expect_identity(*db, kGivenRig, identity.given_rig, "another rig"); !s) return failure(s);
-    if (Status s = expect_identity(*db, kGivenOptions, identity.given_options, "other options"); !s) return failure(s);
-    if (Status s = expect_identity(*db, kGivenKeys, identity.given_keys, "other options given"); !s) return failure(s);
-  }
-  if (Status s = expect_identity(*db, "rig", identity.rig, "another rig"); !s) return failure(s);
-  if (Status s = expect_identity(*db, "options", identity.options, "other options"); !s) return failure(s);
+  if (Status s = internal::expect_identity(*db, identity); !s) return failure(s);
   auto state = std::make_unique<State>(std::move(*db));
   if (Status s = state->prepare(); !s) return failure(s);
   if (Status s = state->return_to_checkpoint(); !s) return failure(s);
