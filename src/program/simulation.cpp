@@ -12,66 +12,15 @@
 #include "program/interrupt.h"
 #include "program/json.h"
 #include "program/progress.h"
-#include "program/shipped_files.h"
-#include "spartan/calibration_io/calibration_files.h"
+#include "program/simulation_plan.h"
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
-#include "spartan/imaging/imager.h"
 #include "spartan/sim/simulator.h"
 
 namespace spartan::program {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Text {
-  std::string content, name;
-  bool is_file = false;
-};
-
-std::string shipped_scenario_names() {
-  std::string names;
-  for (const ShippedFile& file : shipped_files()) {
-    if (file.path.starts_with("scenarios/")) names += (names.empty() ? "" : ", ") + fs::path(file.path).stem().string();
-  }
-  return names;
-}
-
-Result<Text> find_scenario(const std::string& wanted) {
-  std::error_code error;
-  if (!fs::exists(wanted, error)) {
-    if (const auto shipped = shipped_file("scenarios/" + wanted + ".yaml"))
-      return Text{std::string(*shipped), wanted, false};
-    return failure(ErrorCode::input, "is neither a file nor a shipped scenario", wanted,
-                   "shipped scenarios: " + shipped_scenario_names());
-  }
-  const auto content = read_file(wanted);
-  if (!content) return failure(content);
-  return Text{*content, wanted, true};
-}
-
-// A file beside the scenario, else a shipped rig's name.
-Result<Rig> find_rig(const sim::Scenario& scenario, const Text& text) {
-  const fs::path beside = fs::path(text.name).parent_path() / scenario.rig;
-  std::error_code error;
-  if (text.is_file && fs::is_regular_file(beside, error)) return read_rig(beside.string());
-  if (const auto shipped = shipped_file("rigs/" + scenario.rig + ".yaml"))
-    return parse_rig_yaml(std::string(*shipped), scenario.rig);
-  return failure(ErrorCode::configuration,
-                 "the rig '" + scenario.rig + "' is neither a file beside the scenario nor a shipped rig",
-                 option_location(text.content, text.name, "rig"));
-}
-
-Result<std::map<std::string, sim::RectifiedView>> rectified_views(const Rig& rig) {
-  std::map<std::string, sim::RectifiedView> views;
-  for (const StereoPair& pair : rig.pairs) {
-    const auto plan = plan_rectification(*rig.find_camera(pair.left), *rig.find_camera(pair.right),
-                                         rig.right_from_left(pair), "pair '" + pair.name + "'");
-    if (!plan) return failure(plan);
-    views[pair.name] = {plan->geometry, plan->left_from_rectified, plan->right_from_rectified};
-  }
-  return views;
-}
 
 // A recording of the simulator is set aside for a new one.
 Result<ReplacedFolder> replace_recording(const std::string& folder) {
@@ -87,34 +36,10 @@ Result<ReplacedFolder> replace_recording(const std::string& folder) {
 
 // Without a folder.
 Result<sim::SimulationRequest> read_request(const Context& context, const SimulationArguments& arguments) {
-  const auto text = find_scenario(arguments.scenario);
-  if (!text) return failure(text);
-  auto read = sim::read_scenario(text->content, text->name);
-  if (!read) {
-    const auto format = detect_calibration_format(text->name, text->content);
-    // Scenarios and rigs have the keys schema and name in common.
-    if (format && (*format != CalibrationFormat::rig_yaml || text->content.find("\ncameras:") != std::string::npos)) {
-      read.error().hint = fmt::format("this is a calibration ({}), not a scenario; the key rig of a scenario names one",
-                                      name_of(*format));
-    }
-    return failure(read);
-  }
-  for (const std::string& warning : read->warnings) context.log.warning(warning);
-  sim::Scenario* const scenario = &read->options;
-  for (const std::string& assignment : arguments.set) {
-    auto changed = sim::set_scenario_option(*scenario, assignment);
-    if (!changed) return failure(changed);
-    *scenario = std::move(*changed);
-  }
-  if (Status valid = validate(*scenario, "scenario"); !valid) return failure(valid);
-  if (arguments.seed) scenario->seed = *arguments.seed;
-  auto rig = find_rig(*scenario, *text);
-  if (!rig) return failure(rig);
-  auto drive = sim::plan_drive(*scenario, *rig, text->content, text->name);
-  if (!drive) return failure(drive);
-  auto views = rectified_views(sim::nominal_rig(*rig, scenario->nominal_rig));
-  if (!views) return failure(views);
-  return sim::SimulationRequest{*scenario, std::move(*rig), std::move(*drive), std::move(*views), {}, false};
+  auto plan = plan_simulation(arguments.scenario, arguments.seed, arguments.set);
+  if (!plan) return failure(plan);
+  for (const std::string& warning : plan->warnings) context.log.warning(warning);
+  return std::move(plan->request);
 }
 
 }  // namespace

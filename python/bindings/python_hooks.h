@@ -1,0 +1,48 @@
+// Callbacks of Python, and Ctrl-C, in long calls that do not hold the lock of the interpreter.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <chrono>
+#include <exception>
+
+namespace spartan::python {
+
+/// Keeps the first exception of a callback or of a signal handler; the call should then stop, and rethrow() ends it.
+class PythonHooks {
+ public:
+  /// Calls with the lock held; not after an exception.
+  template <class Function>
+  void call(Function&& function) {
+    if (raised_) return;
+    const nanobind::gil_scoped_acquire held;
+    try {
+      function();
+    } catch (...) {
+      raised_ = std::current_exception();
+    }
+  }
+
+  /// Whether something was raised. Lets Python handle signals, at most twenty times a second.
+  bool should_stop() {
+    const auto now = std::chrono::steady_clock::now();
+    if (!raised_ && now >= next_) {
+      next_ = now + std::chrono::milliseconds(50);
+      call([] {
+        if (PyErr_CheckSignals() != 0) throw nanobind::python_error();
+      });
+    }
+    return raised_ != nullptr;
+  }
+
+  /// Throws what was raised.
+  void rethrow() const {
+    if (raised_) std::rethrow_exception(raised_);
+  }
+
+ private:
+  std::exception_ptr raised_;
+  std::chrono::steady_clock::time_point next_;
+};
+
+}  // namespace spartan::python

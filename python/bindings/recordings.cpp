@@ -1,0 +1,117 @@
+#include "bindings/recordings.h"
+
+#include <fmt/format.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "bindings/arrays.h"
+#include "bindings/bindings.h"
+#include "bindings/errors.h"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace spartan::python {
+
+OpenOptions open_options(const std::optional<std::string>& rig, const std::optional<std::string>& format,
+                         const std::optional<std::string>& left, const std::optional<std::string>& right, double fps) {
+  OpenOptions open;
+  open.rig_file = rig.value_or("");
+  if (format) open.format = value_of(parse_recording_format(*format));
+  open.left_images = left.value_or("");
+  open.right_images = right.value_or("");
+  open.fps = fps;
+  return open;
+}
+
+nb::object object_of(Sample sample) {
+  return std::visit([](auto&& each) { return nb::cast(std::forward<decltype(each)>(each)); }, std::move(sample));
+}
+
+namespace {
+
+// Reads on from the position of the recording; one iterator at a time.
+struct SampleIterator {
+  RecordingValue* recording;
+};
+
+nb::object next_sample(SampleIterator& it) {
+  auto sample = it.recording->stream.use([](auto& stream) { return value_of(stream->next()); });
+  if (!sample) throw nb::stop_iteration();
+  return object_of(std::move(*sample));
+}
+
+std::vector<std::string> remarks(const SequenceReport& sequence) {
+  std::vector<std::string> all = sequence.warnings;
+  all.insert(all.end(), sequence.remarks.begin(), sequence.remarks.end());
+  return all;
+}
+
+}  // namespace
+
+void bind_recordings(nb::module_& m) {
+  nb::class_<SampleIterator>(m, "SampleIterator", "Samples of a recording in order of time.")
+      .def("__iter__", [](const nb::handle& self) { return nb::borrow(self); })
+      .def("__next__", next_sample,
+           nb::sig("def __next__(self) -> StereoFrame | ImuSample | WheelSample | CompassSample | InclinometerSample | "
+                   "MissingFrame"));
+  nb::class_<RecordingValue>(m, "Recording",
+                             "Stereo frames and sensor samples of a recording in order of time, whatever its layout. Each "
+                             "iteration begins at the start; only the latest iterator may be used.")
+      .def_prop_ro("rig", [](const RecordingValue& r) { return r.info->rig; })
+      .def_prop_ro("name", [](const RecordingValue& r) { return r.info->name; })
+      .def_prop_ro("format", [](const RecordingValue& r) { return std::string(name_of(r.info->format)); })
+      .def_prop_ro("truth_file",
+                   [](const RecordingValue& r) -> std::optional<std::string> {
+                     const std::string& file = r.info->truth_file;
+                     return file.empty() ? std::nullopt : std::optional(file);
+                   },
+                   "Path of the true trajectory; None without one.")
+      .def_prop_ro("remarks", [](const RecordingValue& r) { return remarks(r.info->sequence); },
+                   "What is irregular or was assumed.")
+      .def("stamps_ns",
+           [](RecordingValue& r, const std::string& pair) {
+             std::vector<std::int64_t> stamps;
+             for (const Stamp& s : r.stream.use([&](auto& stream) { return stream->listed_stamps(pair); }))
+               stamps.push_back(s.ns);
+             return owned_array(std::move(stamps));
+           },
+           "pair"_a, "Stamps of the listed frames of a pair, int64, shape (n,).")
+      .def("frame_at",
+           [](RecordingValue& r, const std::string& pair, std::int64_t stamp) {
+             return r.stream.use([&](auto& stream) { return value_of(stream->frame_at(pair, Stamp{stamp})); });
+           },
+           "pair"_a, "stamp_ns"_a, "One frame, wherever the iteration is. Raises Error where there is none.")
+      .def("__iter__",
+           [](RecordingValue& r) {
+             check(r.stream.use([](auto& stream) { return stream->seek(0); }));
+             return SampleIterator{&r};
+           },
+           nb::keep_alive<0, 1>())
+      .def("__repr__", [](const RecordingValue& r) {
+        const RecordingInfo& info = *r.info;
+        return fmt::format("<Recording '{}' ({}): {} frames>", info.name, name_of(info.format), info.sequence.announced);
+      });
+  m.def(
+      "open_recording",
+      [](const std::string& path, const std::optional<std::string>& rig, const std::optional<std::string>& format,
+         const std::optional<std::string>& left, const std::optional<std::string>& right, double fps) {
+        const OpenOptions options = open_options(rig, format, left, right, fps);
+        const nb::gil_scoped_release free;
+        return std::make_unique<RecordingValue>(value_of(open_recording(path, options)));
+      },
+      "path"_a, nb::kw_only(), "rig"_a = nb::none(), "format"_a = nb::none(), "left"_a = nb::none(),
+      "right"_a = nb::none(), "fps"_a = 0.0,
+      "Opens a folder or a video file; the layout (Spartan, KITTI, EuRoC, image folders …) is detected. `rig`: a "
+      "calibration file to use instead of the recording's own. `left`, `right`: folders or patterns of file names of the "
+      "images.");
+}
+
+}  // namespace spartan::python

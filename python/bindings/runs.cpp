@@ -1,0 +1,157 @@
+// spartan.run(): a whole recording or live stream into a run folder.
+#include "spartan/system/run.h"
+
+#include <fmt/format.h>
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/vector.h>
+
+#include <chrono>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "bindings/bindings.h"
+#include "bindings/errors.h"
+#include "bindings/python_hooks.h"
+#include "bindings/recordings.h"
+#include "bindings/threads.h"
+#include "spartan/core/files.h"
+#include "spartan/core/stage_clock.h"
+#include "spartan/report/report.h"
+#include "spartan/system/run_folder.h"
+#ifdef SPARTAN_HAS_SIM
+#include "program/simulation_plan.h"
+#include "spartan/sim/simulator.h"
+#endif
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace spartan::python {
+namespace {
+
+constexpr const char* kSimulation = "sim:";
+
+// Keys whose values differ from the defaults: the noise that a recording states does not replace them.
+GivenKeys changed_keys(const RunOptions& options) {
+  GivenKeys keys;
+  const auto lines = list_options(options), defaults = list_options(RunOptions());
+  for (std::size_t i = 0; i < lines.size() && i < defaults.size(); ++i) {
+    if (lines[i].value != defaults[i].value) keys.add(lines[i].key);
+  }
+  return keys;
+}
+
+Result<std::unique_ptr<SampleStream>> open_stream(const std::string& address, const OpenOptions& open, double speed,
+                                                  int threads) {
+  if (address.starts_with(kSimulation)) {
+#ifdef SPARTAN_HAS_SIM
+    auto plan = program::plan_simulation(address.substr(std::string(kSimulation).size()), {}, {});
+    if (!plan) return failure(plan);
+    return sim::open_live_simulation(std::move(plan->request), speed, ThreadPool(threads));
+#else
+    return failure(ErrorCode::usage, "this build has no simulator", address);
+#endif
+  }
+  LiveOptions live;
+  live.speed = speed;
+  return open_live_stream(address, open, live);
+}
+
+// Returns the summary.
+std::string run_input(const RunRequest& request, const RunHooks& hooks, double speed, PythonHooks& python) {
+  const nb::gil_scoped_release free;
+  Result<RunOutcome> outcome;
+  if (request.input.starts_with(kSimulation) || is_live_address(request.input)) {
+    const auto stream = value_of(open_stream(request.input, request.open, speed, request.threads));
+    outcome = run_live(*stream, request, hooks);
+  } else {
+    outcome = run(request, hooks);
+  }
+  python.rethrow();
+  return value_of(std::move(outcome)).summary_json;
+}
+
+std::string run_folder(const std::string& input, const std::string& output, const RunOptions* options,
+                       const OpenOptions& open, RunRequest request, double speed, const nb::object& progress,
+                       const nb::object& frame) {
+  request.input = input;
+  request.output = output;
+  request.open = open;
+  if (options != nullptr) {
+    check(validate(*options, "options"));
+    request.options = *options;
+    request.given = changed_keys(*options);
+  }
+  request.memory_bytes = available_memory_bytes() / 5 * 4;
+  request.version = SPARTAN_VERSION;
+  PythonHooks python;
+  RunHooks hooks;
+  hooks.log = Log::to_terminal(LogLevel::warning);
+  hooks.should_stop = [&python] { return python.should_stop(); };
+  if (!progress.is_none()) {
+    hooks.progress = [&](const RunProgress& p) { python.call([&] { progress(p); }); };
+  }
+  if (!frame.is_none()) {
+    hooks.frame = [&](const FrameRecord& record) { python.call([&] { frame(record); }); };
+  }
+  return run_input(request, hooks, speed, python);
+}
+
+void report(const std::string& run, const std::string& recording, const std::optional<std::string>& truth,
+            const std::string& page, std::optional<int> threads) {
+  const int count = thread_count(threads);
+  const nb::gil_scoped_release free;
+  ReportRequest about;
+  about.run = run;
+  about.recording = recording;
+  const RunFolder folder{run};
+  about.options = value_of(load_options<RunOptions>(folder.config()));
+  about.truth = truth.value_or("");
+  about.threads = count;
+  about.page = page;
+  const std::string html = value_of(make_report(about));
+  check(write_file_atomically(page, html));
+}
+
+}  // namespace
+
+void bind_runs(nb::module_& m) {
+  nb::class_<RunProgress>(m, "RunProgress", "How far a run is.")
+      .def_ro("done", &RunProgress::done, "Frames of the odometry's pair, missing ones included.")
+      .def_ro("total", &RunProgress::total, "0: unknown.")
+      .def_ro("distance_m", &RunProgress::distance_m)
+      .def_ro("status", &RunProgress::status, "Of the odometry at the last frame.")
+      .def("__repr__", [](const RunProgress& p) {
+        return fmt::format("<RunProgress {}/{}, {:.1f} m, {}>", p.done, p.total, p.distance_m, p.status);
+      });
+  m.def(
+      "run_into_folder",
+      [](const std::string& input, const std::string& output, const RunOptions* options,
+         const std::optional<std::string>& rig, const std::optional<std::string>& format,
+         const std::optional<std::string>& left, const std::optional<std::string>& right, double fps,
+         std::optional<int> threads, int max_frames, bool resume, bool replace, double speed, const nb::object& progress,
+         const nb::object& frame) {
+        if (max_frames < 0) throw nb::value_error("max_frames: must not be negative");
+        RunRequest request;
+        request.threads = thread_count(threads);
+        request.max_frames = max_frames;
+        request.resume = resume;
+        request.replace = replace;
+        request.record = request.recorded_images == ImageFiles::pnm;
+        return run_folder(input, output, options, open_options(rig, format, left, right, fps), request, speed, progress,
+                          frame);
+      },
+      "input"_a, "output"_a, "options"_a.none() = nb::none(), nb::kw_only(), "rig"_a = nb::none(), "format"_a = nb::none(),
+      "left"_a = nb::none(), "right"_a = nb::none(), "fps"_a = 0.0, "threads"_a = nb::none(), "max_frames"_a = 0,
+      "resume"_a = false, "replace"_a = false, "speed"_a = 1.0, "progress"_a = nb::none(), "frame"_a = nb::none(),
+      "See spartan.run(). Returns the text of summary.json.");
+  m.def("write_report", report, "run"_a, "recording"_a, "truth"_a = nb::none(), "page"_a, "threads"_a = nb::none(),
+        "Writes the report page of a run folder.");
+}
+
+}  // namespace spartan::python

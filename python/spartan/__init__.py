@@ -1,0 +1,16 @@
+"""Spartan: stereo vision for rovers. Where the rover is, and what the ground around it looks like.
+
+    import spartan
+
+    run = spartan.run("kitti_06", "run_06")
+    run.trajectory().positions   # metres, shape (n, 3)
+    run.map().view()["elevation_m"]
+
+Units are SI and radians, stamps are integer nanoseconds, images and maps are arrays of numpy. Frames and covariances:
+docs/conventions.md.
+"""
+
+from spartan._core import *  # noqa: F403
+from spartan._core import __version__
+from spartan._errors import Error
+from spartan._run import Run, run

@@ -1,0 +1,147 @@
+"""Runs: a recording or a live stream becomes a run folder, and what a run folder contains."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from spartan import _core
+
+StrPath = str | os.PathLike[str]
+
+
+class Run:
+    """A run folder (docs/reference/files.md): trajectories, maps, terrain, and the record of every frame."""
+
+    def __init__(self, path: StrPath) -> None:
+        """Opens a run folder. Raises Error where it is not one."""
+        self._results = _core.RunResults(os.fspath(path))
+
+    @property
+    def path(self) -> Path:
+        return Path(self._results.path)
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """summary.json (docs/reference/json.md)."""
+        return dict(json.loads((self.path / "summary.json").read_text(encoding="utf-8")))
+
+    @property
+    def rig(self) -> _core.Rig:
+        """The rig as it was used."""
+        return self._results.rig
+
+    @property
+    def options(self) -> _core.RunOptions:
+        """The options as they were used."""
+        return self._results.options
+
+    @property
+    def frames(self) -> list[_core.FrameRecord]:
+        """The records of all frames of the odometry's pair, in order of time."""
+        return self._results.frames
+
+    @property
+    def stops(self) -> list[_core.MapRecord]:
+        """The local maps that were made, of stops or keyframes."""
+        return self._results.stops
+
+    @property
+    def trajectories(self) -> list[str]:
+        """Names of the trajectories that the run has: `odometry`, `slam`, `localization`, `smoothed`."""
+        return self._results.trajectories
+
+    def trajectory(self, kind: str | None = None) -> _core.Trajectory:
+        """All measured poses `world_from_body`. Without a kind, the best one that was known at each frame."""
+        return self._results.trajectory(kind)
+
+    def covariances(self, kind: str | None = None) -> npt.NDArray[np.float64]:
+        """Covariances of the poses of trajectory(), shape (n, 6, 6), order (translation, rotation), of the right
+        perturbation; m and rad."""
+        return self._results.covariances(kind)
+
+    def map(self) -> _core.GlobalMap:
+        """The global map. Raises Error where the run has none."""
+        return _core.GlobalMap.open(self._results.path)
+
+    def point_clouds(self) -> list[_core.PointCloud]:
+        """The terrain along the path in the world frame, a cloud for each view."""
+        folder = self.path / "terrain"
+        files = [folder / f"{stamp}.ply" for stamp in self._results.terrain_stamps_ns]
+        return [_core.PointCloud.load(str(file)) for file in files if file.exists()]
+
+    def export(self, format: str, path: StrPath, *, trajectory: str | None = None, threads: int | None = None) -> None:
+        """Writes the run as `tum`, `kitti`, `euroc`, `csv` (trajectory), `geotiff`, `octomap` (map), `ply` or `pcd`
+        (terrain)."""
+        self._results.export(format, os.fspath(path), trajectory, threads)
+
+    def __repr__(self) -> str:
+        return f"<Run '{self._results.path}': {len(self.frames)} frames>"
+
+
+def run(
+    input: StrPath,
+    output: StrPath,
+    options: _core.RunOptions | None = None,
+    *,
+    rig: StrPath | None = None,
+    format: str | None = None,
+    left: str | None = None,
+    right: str | None = None,
+    fps: float = 0,
+    threads: int | None = None,
+    max_frames: int = 0,
+    resume: bool = False,
+    replace: bool = False,
+    speed: float = 1,
+    truth: StrPath | None = None,
+    report: bool = False,
+    progress: Callable[[_core.RunProgress], object] | None = None,
+    frame: Callable[[_core.FrameRecord], object] | None = None,
+) -> Run:
+    """Processes a recording or a live stream into a run folder, as `spartan run` does: the same bytes.
+
+    input: folder or video of a recording, or the address of a live stream (`replay:FOLDER`, `live:RIG`, `sim:SCENARIO`).
+    output: run folder to create. An existing one raises Error without `resume` or `replace`.
+    rig, format, left, right, fps: how to read the recording, see open_recording().
+    threads: None is all cores.
+    max_frames: number of stereo frames to process; 0: all.
+    speed: pace of a replay or a simulation.
+    truth: ground truth for the report, a trajectory file or a recording; None: that of the recording.
+    report: also write the report page, `report/index.html`.
+    progress, frame: called after each frame. An exception that one raises ends the run; so does Ctrl-C. What was done
+        is in the folder, and `resume=True` goes on.
+
+    Raises Error, e.g. with the code `input` (no usable recording), `configuration` or `output`.
+    """
+    _core.run_into_folder(
+        os.fspath(input),
+        os.fspath(output),
+        options,
+        rig=None if rig is None else os.fspath(rig),
+        format=format,
+        left=left,
+        right=right,
+        fps=fps,
+        threads=threads,
+        max_frames=max_frames,
+        resume=resume,
+        replace=replace,
+        speed=speed,
+        progress=progress,
+        frame=frame,
+    )
+    finished = Run(output)
+    if report:
+        page = finished.path / "report" / "index.html"
+        page.parent.mkdir(exist_ok=True)
+        _core.write_report(
+            os.fspath(output), os.fspath(input), None if truth is None else os.fspath(truth), str(page), threads
+        )
+    return finished
