@@ -39,6 +39,7 @@ MAY_INCLUDE = {
     "system": SYSTEM | {"figures", "calibration"},
     "report": SYSTEM | {"figures", "calibration", "rig_design", "eval", "system"},
     "program": ALL,
+    "python": ALL,
     "tests": ALL | {"figures", "testing"},
 }
 # Modules whose headers are not installed: no public header may include them.
@@ -69,6 +70,8 @@ def module_of(path, project):
     parts = path.relative_to(project).parts
     if parts[:2] == ("src", "spartan"):
         return parts[2]
+    if parts[:2] == ("python", "bindings"):
+        return "python"
     return "program" if parts[:2] == ("src", "program") else "tests"
 
 
@@ -93,7 +96,7 @@ def fault_of_components(path, included, project):
 def namespace_faults(project):
     """Headers with a using-directive, which opens a namespace for all includers, or an unnamed namespace, whose types
     differ from file to file (GCC warns of that with -Wsubobject-linkage, but not in unity builds)."""
-    for folder in ("src", "tests", "bench"):
+    for folder in ("src", "python", "tests", "bench"):
         for path in sorted((project / folder).rglob("*.h")):
             if USING.search(path.read_text(encoding="utf-8")):
                 yield f"{path.relative_to(project)}: a using-directive in a header"
@@ -107,7 +110,7 @@ def is_internal(included):
 
 def includes(project):
     """Every include as (file, line number, quote, included path)."""
-    for folder in ("src", "tests", "tools", "bench"):
+    for folder in ("src", "python", "tests", "bench"):
         for path in cpp_files(project / folder):
             text = path.read_text(encoding="utf-8")
             for match in INCLUDE.finditer(text):
@@ -153,7 +156,7 @@ def faults(project):
         module = module_of(path, project)
         is_test = path.stem.endswith("_test")
         public = (path.suffix == ".h" and not is_test and not is_internal(str(path)) and
-                  module not in {"program", "tests"} | PRIVATE_MODULES)
+                  module not in {"program", "python", "tests"} | PRIVATE_MODULES)
         parts = included.split("/")
         if parts[0] == "spartan" and len(parts) > 2:
             count += 1
@@ -210,6 +213,7 @@ def self_test():
         ("src/spartan/rig/attic/new.cpp", '#include "spartan/rig/rig.h"', "not listed in COMPONENTS"),
         ("src/spartan/eval/inside.cpp", '#include "spartan/core/internal/detail.h"', "is internal to core"),
         ("src/program/inside.cpp", '#include "spartan/core/internal/detail.h"', "is internal to core"),
+        ("python/bindings/inside.cpp", '#include "spartan/core/internal/detail.h"', "is internal to core"),
         ("src/spartan/core/leak.h", '#include "spartan/core/internal/detail.h"', "which is not installed"),
         ("src/spartan/eval/open.h", "using namespace std;", "using-directive in a header"),
         ("src/spartan/eval/open.cpp", "using namespace std;", None),

@@ -27,8 +27,7 @@ void check_pixels(const AnyArray& array, nb::dlpack::dtype type, std::size_t cha
   }
   const bool colour = channels == 3;
   if (array.ndim() != (colour ? 3 : 2) || (colour && array.shape(2) != 3)) {
-    throw nb::value_error(
-        fmt::format("{}: must have the shape (height, width{})", name, colour ? ", 3" : "").c_str());
+    throw nb::value_error(fmt::format("{}: must have the shape (height, width{})", name, colour ? ", 3" : "").c_str());
   }
   constexpr std::size_t kMostPixels = 32767;  // of a side
   if (array.shape(0) > kMostPixels || array.shape(1) > kMostPixels)

@@ -97,7 +97,8 @@ ImageView<const T> image_view(const AnyArray& array, const char* name) {
 /// Pixels of other memory, which `owner` keeps alive and unchanged.
 template <class T>
 ImageArray<const T> shared_array(ImageView<const T> view, nb::handle owner) {
-  const std::array<std::size_t, 2> shape{static_cast<std::size_t>(view.height()), static_cast<std::size_t>(view.width())};
+  const std::array<std::size_t, 2> shape{static_cast<std::size_t>(view.height()),
+                                         static_cast<std::size_t>(view.width())};
   const std::array<std::int64_t, 2> strides{view.stride(), 1};
   return ImageArray<const T>(view.data(), 2, shape.data(), owner, strides.data());
 }

@@ -87,27 +87,32 @@ void bind_findings(nb::module_& m) {
       .def_ro("mean_px", &RowErrors::mean_px, "Of the absolute values.")
       .def_ro("p95_px", &RowErrors::p95_px, "Of the absolute values.")
       .def_ro("median_px", &RowErrors::median_px, "Signed.")
-      .def("__repr__", [](const RowErrors& e) { return fmt::format("<mean {:.3f}, p95 {:.3f} px>", e.mean_px, e.p95_px); });
+      .def("__repr__",
+           [](const RowErrors& e) { return fmt::format("<mean {:.3f}, p95 {:.3f} px>", e.mean_px, e.p95_px); });
   nb::class_<PairCorrection>(m, "PairCorrection", "A small correction of a stereo calibration.")
       .def_ro("pitch_rad", &PairCorrection::pitch_rad)
       .def_ro("yaw_rad", &PairCorrection::yaw_rad)
       .def_ro("roll_rad", &PairCorrection::roll_rad)
       .def_ro("focal_ratio", &PairCorrection::focal_ratio, "Factor on the focal length of the right camera.");
   nb::class_<PairInspection>(m, "CalibrationCheck", "What the images say about the calibration of a pair.")
-      .def_prop_ro("grade", [](const PairInspection& i) { return std::string(name_of(i.check.grade)); },
-                   "`good`, `usable` or `bad`.")
+      .def_prop_ro(
+          "grade", [](const PairInspection& i) { return std::string(name_of(i.check.grade)); },
+          "`good`, `usable` or `bad`.")
       .def_prop_ro("findings", [](const PairInspection& i) { return i.check.findings; })
       .def_prop_ro("matches", [](const PairInspection& i) { return i.check.matches; })
       .def_prop_ro("inliers", [](const PairInspection& i) { return i.check.inliers; })
-      .def_prop_ro("row_errors", [](const PairInspection& i) { return i.check.nominal_rows; }, "By the calibration as given.")
+      .def_prop_ro(
+          "row_errors", [](const PairInspection& i) { return i.check.nominal_rows; }, "By the calibration as given.")
       .def_prop_ro("corrected_row_errors", [](const PairInspection& i) { return i.check.corrected_rows; })
       .def_prop_ro("correction", [](const PairInspection& i) { return i.check.correction; })
-      .def_prop_ro("sigma", [](const PairInspection& i) { return i.check.sigma; }, "Standard deviations of the correction.")
-      .def_prop_ro("corrected", [](const PairInspection& i) { return i.check.corrected; },
-                   "The rig with the findings corrected; None where nothing explains the images.")
+      .def_prop_ro(
+          "sigma", [](const PairInspection& i) { return i.check.sigma; }, "Standard deviations of the correction.")
+      .def_prop_ro(
+          "corrected", [](const PairInspection& i) { return i.check.corrected; },
+          "The rig with the findings corrected; None where nothing explains the images.")
       .def("__repr__", [](const PairInspection& i) {
-        return fmt::format("<CalibrationCheck: {}, {} of {} matches, {} findings>", name_of(i.check.grade), i.check.inliers,
-                           i.check.matches, i.check.findings.size());
+        return fmt::format("<CalibrationCheck: {}, {} of {} matches, {} findings>", name_of(i.check.grade),
+                           i.check.inliers, i.check.matches, i.check.findings.size());
       });
 }
 
@@ -120,41 +125,52 @@ void bind_calibrations(nb::module_& m) {
       .def_prop_ro("format", [](const LoadedRig& r) { return std::string(name_of(r.format)); })
       .def_ro("files", &LoadedRig::files)
       .def_ro("notes", &LoadedRig::notes, "Decisions of the reader.")
-      .def_prop_ro("ignored",
-                   [](const LoadedRig& r) {
-                     std::vector<std::string> lines;
-                     for (const RigDifference& each : r.ignored) lines.push_back(each.key + ": " + each.text);
-                     return lines;
-                   },
-                   "Content that a rig cannot represent.");
-  m.def("read_calibration", read, "path"_a, "format"_a = nb::none(), "size"_a = nb::none(),
-        "Reads a calibration of any format (rig.yaml, KITTI, EuRoC, Kalibr, OpenCV, ROS, mrcal, CAHVOR …), detected from its "
-        "name and content. `path`: a file, a folder, or \"LEFT,RIGHT\". `size`: (width, height) for formats without it.");
-  m.def("read_rig", [](const std::string& path, const std::optional<Size>& size) { return value_of(read_rig(path, size_of(size))); },
-        "path"_a, "size"_a = nb::none(), "The rig of read_calibration().");
+      .def_prop_ro(
+          "ignored",
+          [](const LoadedRig& r) {
+            std::vector<std::string> lines;
+            for (const RigDifference& each : r.ignored) lines.push_back(each.key + ": " + each.text);
+            return lines;
+          },
+          "Content that a rig cannot represent.");
+  m.def(
+      "read_calibration", read, "path"_a, "format"_a = nb::none(), "size"_a = nb::none(),
+      "Reads a calibration of any format (rig.yaml, KITTI, EuRoC, Kalibr, OpenCV, ROS, mrcal, CAHVOR …), detected from "
+      "its "
+      "name and content. `path`: a file, a folder, or \"LEFT,RIGHT\". `size`: (width, height) for formats without it.");
+  m.def(
+      "read_rig",
+      [](const std::string& path, const std::optional<Size>& size) { return value_of(read_rig(path, size_of(size))); },
+      "path"_a, "size"_a = nb::none(), "The rig of read_calibration().");
   m.def("write_calibration", write, "rig"_a, "path"_a, "format"_a = nb::none(),
-        "Writes a rig in a format, chosen by the name of the file or given. Returns what the format does not represent, a line "
+        "Writes a rig in a format, chosen by the name of the file or given. Returns what the format does not "
+        "represent, a line "
         "each.");
-  m.def("calibration_formats",
-        [] {
-          std::vector<std::string> names;
-          for (const auto each : calibration_format_names()) names.emplace_back(each);
-          return names;
-        },
-        "The names of all formats.");
-  m.def("check_calibration", inspect, "rig"_a, "frames"_a, "pair"_a = nb::none(), nb::kw_only(), "threads"_a = nb::none(),
-        nb::sig("def check_calibration(rig: Rig, frames: collections.abc.Sequence[tuple[numpy.typing.NDArray[numpy.uint8], "
-                "numpy.typing.NDArray[numpy.uint8]]], pair: str | None = None, *, threads: int | None = None) -> "
-                "CalibrationCheck"),
-        "Checks the calibration of a pair (the first one without a name) by its images, unrectified uint8 (left, right); 12 "
+  m.def(
+      "calibration_formats",
+      [] {
+        std::vector<std::string> names;
+        for (const auto each : calibration_format_names()) names.emplace_back(each);
+        return names;
+      },
+      "The names of all formats.");
+  m.def("check_calibration", inspect, "rig"_a, "frames"_a, "pair"_a = nb::none(), nb::kw_only(),
+        "threads"_a = nb::none(),
+        nb::sig(
+            "def check_calibration(rig: Rig, frames: collections.abc.Sequence[tuple[numpy.typing.NDArray[numpy.uint8], "
+            "numpy.typing.NDArray[numpy.uint8]]], pair: str | None = None, *, threads: int | None = None) -> "
+            "CalibrationCheck"),
+        "Checks the calibration of a pair (the first one without a name) by its images, unrectified uint8 (left, "
+        "right); 12 "
         "frames of different scenes are plenty.");
-  m.def("plausibility_findings",
-        [](const Rig& rig, const std::string& name) {
-          const StereoPair* const pair = rig.find_pair(name);
-          if (pair == nullptr) throw nb::key_error(name.c_str());
-          return plausibility_findings(rig, *pair);
-        },
-        "rig"_a, "pair"_a, "What is implausible about a pair by its numbers alone.");
+  m.def(
+      "plausibility_findings",
+      [](const Rig& rig, const std::string& name) {
+        const StereoPair* const pair = rig.find_pair(name);
+        if (pair == nullptr) throw nb::key_error(name.c_str());
+        return plausibility_findings(rig, *pair);
+      },
+      "rig"_a, "pair"_a, "What is implausible about a pair by its numbers alone.");
 }
 
 }  // namespace spartan::python

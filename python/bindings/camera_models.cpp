@@ -1,5 +1,3 @@
-#include "spartan/rig/models/camera_model.h"
-
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
@@ -16,6 +14,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/camera_model.h"
+#include "spartan/rig/models/camera_model.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -89,7 +88,7 @@ RowsArray<double, 2> project_points(const CameraModelValue& m, const NumberArray
 }
 
 nb::ndarray<nb::numpy, double, nb::shape<-1, 2, 3>> project_jacobians(const CameraModelValue& m,
-                                                                     const NumberArray& points) {
+                                                                      const NumberArray& points) {
   const Rows rows(points, 3, "points");
   auto* const values = new std::vector<double>(6 * rows.count(), kNone);
   const nb::capsule owner(values, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
@@ -101,7 +100,7 @@ nb::ndarray<nb::numpy, double, nb::shape<-1, 2, 3>> project_jacobians(const Came
 }
 
 std::tuple<RowsArray<double, 3>, RowsArray<double, 3>> unproject_pixels(const CameraModelValue& m,
-                                                                      const NumberArray& pixels) {
+                                                                        const NumberArray& pixels) {
   const Rows rows(pixels, 2, "pixels");
   std::vector<double> origins(3 * rows.count(), kNone), directions(3 * rows.count(), kNone);
   {
@@ -130,33 +129,39 @@ std::string repr(const CameraModelValue& m) {
 void bind_camera_models(nb::module_& m) {
   nb::class_<CameraModelValue>(m, "CameraModel",
                                "How a camera maps points of its optical frame (x right, y down, z forward) to pixels.")
-      .def("__init__",
-           [](CameraModelValue* self, const std::string& kind, const nb::kwargs& values) {
-             new (self) CameraModelValue(make_model(kind, values));
-           },
-           nb::sig("def __init__(self, kind: str, **parameters: object) -> None"),
-           "A model of rig.yaml with its parameters: `CameraModel('pinhole', focal_px=[700, 700], centre_px=[320, 240])`.")
-      .def_prop_ro("kind", [](const CameraModelValue& c) { return std::string(name_of(c.model)); },
-                   "Name of the model in rig.yaml.")
+      .def(
+          "__init__",
+          [](CameraModelValue* self, const std::string& kind, const nb::kwargs& values) {
+            new (self) CameraModelValue(make_model(kind, values));
+          },
+          nb::sig("def __init__(self, kind: str, **parameters: object) -> None"),
+          "A model of rig.yaml with its parameters: `CameraModel('pinhole', focal_px=[700, 700], centre_px=[320, "
+          "240])`.")
+      .def_prop_ro(
+          "kind", [](const CameraModelValue& c) { return std::string(name_of(c.model)); },
+          "Name of the model in rig.yaml.")
       .def_prop_ro("parameters", parameter_values, nb::sig("def parameters(self) -> dict[str, list[float]]"),
                    "The values under the keys of rig.yaml.")
       .def("project", project_points, "points"_a,
-           "Points in the optical frame, shape (n, 3), in metres, to pixels, shape (n, 2). Integer coordinates are pixel "
+           "Points in the optical frame, shape (n, 3), in metres, to pixels, shape (n, 2). Integer coordinates are "
+           "pixel "
            "centres. NaN where a point is outside of the domain of the model.")
       .def("project_jacobian", project_jacobians, "points"_a,
            "Derivatives of the pixels by the points, shape (n, 2, 3), px/m. NaN outside of the domain.")
       .def("unproject", unproject_pixels, "pixels"_a,
            "Pixels, shape (n, 2), to rays: origins (m; zero for central cameras) and unit directions, both of shape "
            "(n, 3). NaN where no ray of the domain has that pixel.")
-      .def_static("kinds",
-                  [] {
-                    std::vector<std::string> names;
-                    for (const auto name : camera_model_names()) names.emplace_back(name);
-                    return names;
-                  },
-                  "The names of all models.")
-      .def("__eq__", [](const CameraModelValue& a, const CameraModelValue& b) { return a.model == b.model; },
-           nb::is_operator())
+      .def_static(
+          "kinds",
+          [] {
+            std::vector<std::string> names;
+            for (const auto name : camera_model_names()) names.emplace_back(name);
+            return names;
+          },
+          "The names of all models.")
+      .def(
+          "__eq__", [](const CameraModelValue& a, const CameraModelValue& b) { return a.model == b.model; },
+          nb::is_operator())
       .def("__repr__", repr);
 }
 

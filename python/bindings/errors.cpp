@@ -10,16 +10,26 @@ namespace spartan::python {
 
 const char* name_of(ErrorCode code) {
   switch (code) {
-    case ErrorCode::internal: return "internal";
-    case ErrorCode::usage: return "usage";
-    case ErrorCode::input: return "input";
-    case ErrorCode::frame_rejected: return "frame_rejected";
-    case ErrorCode::store_damaged: return "store_damaged";
-    case ErrorCode::configuration: return "configuration";
-    case ErrorCode::output: return "output";
-    case ErrorCode::read_error: return "read_error";
-    case ErrorCode::resources: return "resources";
-    case ErrorCode::interrupted: return "interrupted";
+    case ErrorCode::internal:
+      return "internal";
+    case ErrorCode::usage:
+      return "usage";
+    case ErrorCode::input:
+      return "input";
+    case ErrorCode::frame_rejected:
+      return "frame_rejected";
+    case ErrorCode::store_damaged:
+      return "store_damaged";
+    case ErrorCode::configuration:
+      return "configuration";
+    case ErrorCode::output:
+      return "output";
+    case ErrorCode::read_error:
+      return "read_error";
+    case ErrorCode::resources:
+      return "resources";
+    case ErrorCode::interrupted:
+      return "interrupted";
   }
   return "internal";
 }

@@ -67,24 +67,27 @@ void bind_trajectory_metrics(nb::module_& m) {
       .def_ro("frames", &TrajectoryMetrics::frames, "Number of associated poses.")
       .def_ro("path_length_m", &TrajectoryMetrics::path_length_m)
       .def_ro("ate_m", &TrajectoryMetrics::ate_m, "Absolute trajectory error, m.")
-      .def_ro("drift_percent", &TrajectoryMetrics::drift_percent, "Error of the last position, percent of the path length.")
+      .def_ro("drift_percent", &TrajectoryMetrics::drift_percent,
+              "Error of the last position, percent of the path length.")
       .def_ro("rpe_translation_m", &TrajectoryMetrics::rpe_translation_m)
       .def_ro("rpe_rotation_deg", &TrajectoryMetrics::rpe_rotation_deg)
       .def_ro("segments", &TrajectoryMetrics::segments)
-      .def_prop_ro("missing",
-                   [](const TrajectoryMetrics& t) {
-                     nb::dict reasons;
-                     for (const MissingMetric& each : t.missing) reasons[each.name.c_str()] = each.reason;
-                     return reasons;
-                   },
-                   nb::sig("def missing(self) -> dict[str, str]"), "Metrics that could not be computed, and why.")
+      .def_prop_ro(
+          "missing",
+          [](const TrajectoryMetrics& t) {
+            nb::dict reasons;
+            for (const MissingMetric& each : t.missing) reasons[each.name.c_str()] = each.reason;
+            return reasons;
+          },
+          nb::sig("def missing(self) -> dict[str, str]"), "Metrics that could not be computed, and why.")
       .def("__repr__", [](const TrajectoryMetrics& t) {
         return fmt::format("<TrajectoryMetrics of {} poses: ATE {:.4f} m, drift {}>", t.frames, t.ate_m.rmse,
                            t.drift_percent ? fmt::format("{:.3f} %", *t.drift_percent) : "unknown");
       });
   m.def("evaluate_trajectory", evaluate, "estimate"_a, "truth"_a, nb::kw_only(), "align"_a = "se3",
         "segments_m"_a = nb::none(), "kitti"_a = false, "max_dt_s"_a = 0.02,
-        "Compares two trajectories, poses as world_from_body of the same body frame. `align`: what is fitted before: `none`, "
+        "Compares two trajectories, poses as world_from_body of the same body frame. `align`: what is fitted before: "
+        "`none`, "
         "`first`, `yaw`, `se3` or `sim3`. `kitti`: segments of 100 to 800 m.");
   m.def("evaluate_run", evaluate_files, "estimate"_a, "truth"_a, nb::kw_only(), "align"_a = "se3",
         "segments_m"_a = nb::none(), "kitti"_a = false, "max_dt_s"_a = 0.02, "kind"_a = "",
@@ -96,7 +99,8 @@ void bind_disparity_metrics(nb::module_& m) {
   nb::class_<DisparityScores>(m, "DisparityScores", "Scores over the pixels of one kind; None over no pixels.")
       .def_ro("truth_pixels", &DisparityScores::truth_pixels)
       .def_ro("matched_pixels", &DisparityScores::matched_pixels)
-      .def_ro("bad_0_5", &DisparityScores::bad_0_5, "Percent of the truth pixels with an error above 0.5 px; holes are bad.")
+      .def_ro("bad_0_5", &DisparityScores::bad_0_5,
+              "Percent of the truth pixels with an error above 0.5 px; holes are bad.")
       .def_ro("bad_1", &DisparityScores::bad_1)
       .def_ro("bad_2", &DisparityScores::bad_2)
       .def_ro("bad_3", &DisparityScores::bad_3)
@@ -108,18 +112,21 @@ void bind_disparity_metrics(nb::module_& m) {
   nb::class_<DisparityMetrics>(m, "DisparityMetrics")
       .def_ro("all", &DisparityMetrics::all)
       .def_ro("nonocc", &DisparityMetrics::nonocc, "Pixels that both cameras see; None without a mask.");
-  m.def("evaluate_disparity",
-        [](const AnyArray& estimate, const AnyArray& truth, const std::optional<AnyArray>& mask) {
-          return value_of(compare_disparities(image_view<float>(estimate, "estimate"), image_view<float>(truth, "truth"),
-                                              mask ? image_view<std::uint8_t>(*mask, "mask")
-                                                   : ImageView<const std::uint8_t>()));
-        },
-        "estimate"_a, "truth"_a, "mask"_a = nb::none(),
-        "Compares disparities (float32, px, NaN where unknown). `mask`: 255 seen by both cameras, 128 occluded, 0 no truth.");
-  m.def("read_disparity",
-        [](const std::string& path, double scale) { return owned_array(value_of(read_disparity(path, scale))); }, "path"_a,
-        "scale_of_8_bit"_a = 1.0,
-        "Reads disparities in px, NaN where unknown: PFM, 16-bit PNG (value / 256), 8-bit PNG (value / scale).");
+  m.def(
+      "evaluate_disparity",
+      [](const AnyArray& estimate, const AnyArray& truth, const std::optional<AnyArray>& mask) {
+        return value_of(
+            compare_disparities(image_view<float>(estimate, "estimate"), image_view<float>(truth, "truth"),
+                                mask ? image_view<std::uint8_t>(*mask, "mask") : ImageView<const std::uint8_t>()));
+      },
+      "estimate"_a, "truth"_a, "mask"_a = nb::none(),
+      "Compares disparities (float32, px, NaN where unknown). `mask`: 255 seen by both cameras, 128 occluded, 0 no "
+      "truth.");
+  m.def(
+      "read_disparity",
+      [](const std::string& path, double scale) { return owned_array(value_of(read_disparity(path, scale))); },
+      "path"_a, "scale_of_8_bit"_a = 1.0,
+      "Reads disparities in px, NaN where unknown: PFM, 16-bit PNG (value / 256), 8-bit PNG (value / scale).");
 }
 
 }  // namespace

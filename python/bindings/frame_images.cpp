@@ -33,8 +33,8 @@ nb::object array_of_pixels(const FrameImage& image) {
                                          static_cast<std::size_t>(view.width()), channels};
   const std::array<std::int64_t, 3> strides{view.stride() * static_cast<std::int64_t>(channels),
                                             static_cast<std::int64_t>(channels), 1};
-  return nb::cast(nb::ndarray<nb::numpy, const Channel>(view.data(), channels == 1 ? 2 : 3, shape.data(), owner,
-                                                        strides.data()));
+  return nb::cast(
+      nb::ndarray<nb::numpy, const Channel>(view.data(), channels == 1 ? 2 : 3, shape.data(), owner, strides.data()));
 }
 
 }  // namespace

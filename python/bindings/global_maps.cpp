@@ -35,7 +35,8 @@ MapView view_of(SavedMap& saved, const std::optional<Window>& wanted) {
   constexpr double kMost_m = 1e6;  // of a coordinate: the columns are counted by int
   for (const double each : {west, east, south, north}) {
     if (!(std::abs(each) < kMost_m))
-      throw RaisedError(Error{ErrorCode::usage, "is not a rectangle of the world", "extent", "metres: west, east, south, north"});
+      throw RaisedError(
+          Error{ErrorCode::usage, "is not a rectangle of the world", "extent", "metres: west, east, south, north"});
   }
   if (west >= east || south >= north)
     throw RaisedError(Error{ErrorCode::usage, "has no area", "extent", "the order is west, east, south, north"});
@@ -65,22 +66,29 @@ void export_to(MapValue& map, const std::string& path, const std::optional<Windo
 }
 
 void bind_views(nb::module_& m) {
-  nb::class_<MapViewValue>(m, "MapView",
-                           "A rectangle of the global map. Layers are float32 of shape (rows, columns); row 0 lies in the north "
-                           "(largest y), NaN is unknown.")
-      .def_prop_ro("layers", [](const nb::handle& self) { return layers_of(nb::inst_ptr<MapViewValue>(self)->bands, self); },
-                   nb::sig("def layers(self) -> dict[str, numpy.typing.NDArray[numpy.float32]]"),
-                   "All layers by their names in map files: `elevation_m`, `variance_m2`, `class`, `cost` …")
-      .def("__getitem__",
-           [](const nb::handle& self, const std::string& name) {
-             return layer_of(nb::inst_ptr<MapViewValue>(self)->bands, name, self);
-           },
-           nb::sig("def __getitem__(self, layer: str, /) -> numpy.typing.NDArray[numpy.float32]"), "One layer; KeyError.")
-      .def_prop_ro("cell_m", [](const MapViewValue& v) { return v.view.cell_m; }, "Side of a cell, m.")
-      .def_prop_ro("extent", [](const MapViewValue& v) { return extent_of(v.view.place(), v.view.window.size()); },
-                   "(west, east, south, north) in m, as `extent` of matplotlib's imshow.")
-      .def("render", [](const MapViewValue& v) { return render(v.bands, v.view.kind.view(), v.view.cell_m); },
-           "Elevations in colours with obstacles in red and cavities in blue, uint8, shape (rows, columns, 3).");
+  nb::class_<MapViewValue>(
+      m, "MapView",
+      "A rectangle of the global map. Layers are float32 of shape (rows, columns); row 0 lies in the north "
+      "(largest y), NaN is unknown.")
+      .def_prop_ro(
+          "layers", [](const nb::handle& self) { return layers_of(nb::inst_ptr<MapViewValue>(self)->bands, self); },
+          nb::sig("def layers(self) -> dict[str, numpy.typing.NDArray[numpy.float32]]"),
+          "All layers by their names in map files: `elevation_m`, `variance_m2`, `class`, `cost` …")
+      .def(
+          "__getitem__",
+          [](const nb::handle& self, const std::string& name) {
+            return layer_of(nb::inst_ptr<MapViewValue>(self)->bands, name, self);
+          },
+          nb::sig("def __getitem__(self, layer: str, /) -> numpy.typing.NDArray[numpy.float32]"),
+          "One layer; KeyError.")
+      .def_prop_ro(
+          "cell_m", [](const MapViewValue& v) { return v.view.cell_m; }, "Side of a cell, m.")
+      .def_prop_ro(
+          "extent", [](const MapViewValue& v) { return extent_of(v.view.place(), v.view.window.size()); },
+          "(west, east, south, north) in m, as `extent` of matplotlib's imshow.")
+      .def(
+          "render", [](const MapViewValue& v) { return render(v.bands, v.view.kind.view(), v.view.cell_m); },
+          "Elevations in colours with obstacles in red and cavities in blue, uint8, shape (rows, columns, 3).");
   nb::class_<MapStop>(m, "MapStop", "A stop whose local map is part of a global map.")
       .def_ro("id", &MapStop::id)
       .def_prop_ro("stamp_ns", [](const MapStop& s) { return s.stamp.ns; })
@@ -89,44 +97,53 @@ void bind_views(nb::module_& m) {
       .def_ro("elevation_m", &MapSample::elevation_m)
       .def_ro("variance_m2", &MapSample::variance_m2)
       .def_ro("occupancy_logodds", &MapSample::occupancy_logodds)
-      .def_prop_ro("kind", [](const MapSample& s) { return class_categories()[static_cast<std::size_t>(s.kind)].name; });
+      .def_prop_ro("kind",
+                   [](const MapSample& s) { return class_categories()[static_cast<std::size_t>(s.kind)].name; });
 }
 
 }  // namespace
 
 void bind_global_maps(nb::module_& m) {
   bind_views(m);
-  nb::class_<MapValue>(m, "GlobalMap", "The global map of a run or of a map file; its tiles are read where they are needed.")
-      .def_static("open",
-                  [](const std::string& path) {
-                    const nb::gil_scoped_release free;
-                    return std::make_unique<MapValue>(value_of(SavedMap::open(path)));
-                  },
-                  "path"_a, "Opens the map of a run folder or a map file.")
+  nb::class_<MapValue>(m, "GlobalMap",
+                       "The global map of a run or of a map file; its tiles are read where they are needed.")
+      .def_static(
+          "open",
+          [](const std::string& path) {
+            const nb::gil_scoped_release free;
+            return std::make_unique<MapValue>(value_of(SavedMap::open(path)));
+          },
+          "path"_a, "Opens the map of a run folder or a map file.")
       .def_prop_ro("cell_m", [](MapValue& map) { return map.use([](SavedMap& s) { return s.map().cell_m(); }); })
-      .def_prop_ro("extent",
-                   [](MapValue& map) {
-                     return map.use([](SavedMap& s) {
-                       const LatticeWindow all = s.map().extent();
-                       return extent_of(all.place(s.map().cell_m()), all.size());
-                     });
-                   },
-                   "(west, east, south, north) in m.")
+      .def_prop_ro(
+          "extent",
+          [](MapValue& map) {
+            return map.use([](SavedMap& s) {
+              const LatticeWindow all = s.map().extent();
+              return extent_of(all.place(s.map().cell_m()), all.size());
+            });
+          },
+          "(west, east, south, north) in m.")
       .def_prop_ro("stops", [](MapValue& map) { return map.use([](SavedMap& s) { return s.map().stops(); }); })
       .def("view", view, "extent"_a = nb::none(),
-           "A rectangle (west, east, south, north) in m; without one the whole map. Raises Error where it has more than 8 "
+           "A rectangle (west, east, south, north) in m; without one the whole map. Raises Error where it has more "
+           "than 8 "
            "million cells.")
-      .def("at",
-           [](MapValue& map, double x, double y) {
-             if (!(std::abs(x) < 1e6) || !(std::abs(y) < 1e6)) throw nb::value_error("x_m, y_m: must be within 1000 km");
-             return map.use([&](SavedMap& s) { return value_of(s.map().at(x, y)); });
-           },
-           "x_m"_a, "y_m"_a, "The map at a position, interpolated; None where it is not known.")
-      .def("export", export_to, "path"_a, "extent"_a = nb::none(), nb::kw_only(), "layers"_a = std::vector<std::string>(),
-           "Writes a rectangle in the format of the extension: .tif (GeoTIFF), .png, .ply, .pcd, .bt (OctoMap), .asc or .yaml "
+      .def(
+          "at",
+          [](MapValue& map, double x, double y) {
+            if (!(std::abs(x) < 1e6) || !(std::abs(y) < 1e6)) throw nb::value_error("x_m, y_m: must be within 1000 km");
+            return map.use([&](SavedMap& s) { return value_of(s.map().at(x, y)); });
+          },
+          "x_m"_a, "y_m"_a, "The map at a position, interpolated; None where it is not known.")
+      .def("export", export_to, "path"_a, "extent"_a = nb::none(), nb::kw_only(),
+           "layers"_a = std::vector<std::string>(),
+           "Writes a rectangle in the format of the extension: .tif (GeoTIFF), .png, .ply, .pcd, .bt (OctoMap), .asc "
+           "or .yaml "
            "(occupancy grid). `layers`: of a GeoTIFF or grid.")
       .def("__repr__", [](MapValue& map) {
-        const auto [stops, tiles] = map.use([](SavedMap& s) { return std::pair(s.map().stops().size(), s.map().tiles()); });
+        const auto [stops, tiles] =
+            map.use([](SavedMap& s) { return std::pair(s.map().stops().size(), s.map().tiles()); });
         return fmt::format("<GlobalMap of {} stops, {} tiles>", stops, tiles);
       });
 }

@@ -64,7 +64,8 @@ void add_view(Mapper& mapper, const RectifiedPairValue& pair, double nearest_m) 
 LocalMapValue make_map(Mapper& mapper, const Pose& map_from_body) {
   return mapper.use([&](StopMapper& stop) {
     if (stop.views().empty())
-      throw RaisedError(Error{ErrorCode::usage, "there is no view to make a map of", "StopMapper.map", "add one before"});
+      throw RaisedError(
+          Error{ErrorCode::usage, "there is no view to make a map of", "StopMapper.map", "add one before"});
     const std::vector<SurfacePoint> points = surface_points(stop.merge());
     LocalMap map = stop.map(points, map_from_body);
     stop.leave();
@@ -80,7 +81,8 @@ void save(const LocalMapValue& map, const std::string& path) {
 
 void bind_obstacles(nb::module_& m) {
   nb::class_<Obstacle>(m, "Obstacle", "Connected cells of a map that are obstacles.")
-      .def_prop_ro("middle_m", [](const Obstacle& o) { return matrix_array(o.middle_m); }, "x and y of its middle, m.")
+      .def_prop_ro(
+          "middle_m", [](const Obstacle& o) { return matrix_array(o.middle_m); }, "x and y of its middle, m.")
       .def_ro("width_m", &Obstacle::width_m, "Along x.")
       .def_ro("length_m", &Obstacle::length_m, "Along y.")
       .def_ro("height_m", &Obstacle::height_m, "Above the ground.")
@@ -91,36 +93,46 @@ void bind_obstacles(nb::module_& m) {
 
 void bind_local_maps(nb::module_& m) {
   bind_obstacles(m);
-  nb::class_<LocalMapValue>(m, "LocalMap",
-                            "The terrain around one stop as a grid. Layers are float32 of shape (rows, columns); row 0 lies in "
-                            "the north (largest y), NaN is unknown.")
-      .def_prop_ro("layers", [](const nb::handle& self) { return layers_of(nb::inst_ptr<LocalMapValue>(self)->bands, self); },
-                   nb::sig("def layers(self) -> dict[str, numpy.typing.NDArray[numpy.float32]]"),
-                   "All layers by their names in map files: `elevation_m`, `variance_m2`, `class`, `cost` …")
-      .def("__getitem__",
-           [](const nb::handle& self, const std::string& name) {
-             return layer_of(nb::inst_ptr<LocalMapValue>(self)->bands, name, self);
-           },
-           nb::sig("def __getitem__(self, layer: str, /) -> numpy.typing.NDArray[numpy.float32]"), "One layer; KeyError.")
-      .def_prop_ro("cell_m", [](const LocalMapValue& v) { return v.map.place.cell_m; }, "Side of a cell, m.")
-      .def_prop_ro("extent", [](const LocalMapValue& v) { return extent_of(v.map.place, v.map.size()); },
-                   "(west, east, south, north) in m, as `extent` of matplotlib's imshow.")
+  nb::class_<LocalMapValue>(
+      m, "LocalMap",
+      "The terrain around one stop as a grid. Layers are float32 of shape (rows, columns); row 0 lies in "
+      "the north (largest y), NaN is unknown.")
+      .def_prop_ro(
+          "layers", [](const nb::handle& self) { return layers_of(nb::inst_ptr<LocalMapValue>(self)->bands, self); },
+          nb::sig("def layers(self) -> dict[str, numpy.typing.NDArray[numpy.float32]]"),
+          "All layers by their names in map files: `elevation_m`, `variance_m2`, `class`, `cost` …")
+      .def(
+          "__getitem__",
+          [](const nb::handle& self, const std::string& name) {
+            return layer_of(nb::inst_ptr<LocalMapValue>(self)->bands, name, self);
+          },
+          nb::sig("def __getitem__(self, layer: str, /) -> numpy.typing.NDArray[numpy.float32]"),
+          "One layer; KeyError.")
+      .def_prop_ro(
+          "cell_m", [](const LocalMapValue& v) { return v.map.place.cell_m; }, "Side of a cell, m.")
+      .def_prop_ro(
+          "extent", [](const LocalMapValue& v) { return extent_of(v.map.place, v.map.size()); },
+          "(west, east, south, north) in m, as `extent` of matplotlib's imshow.")
       .def_prop_ro("map_from_body", [](const LocalMapValue& v) { return v.map.map_from_body; })
       .def_prop_ro("obstacles", [](const LocalMapValue& v) { return v.map.obstacles; })
-      .def("render", [](const LocalMapValue& v) { return render(v.bands, v.map.kind.view(), v.map.place.cell_m); },
-           "Elevations in colours with obstacles in red and cavities in blue, uint8, shape (rows, columns, 3).")
+      .def(
+          "render", [](const LocalMapValue& v) { return render(v.bands, v.map.kind.view(), v.map.place.cell_m); },
+          "Elevations in colours with obstacles in red and cavities in blue, uint8, shape (rows, columns, 3).")
       .def("save", save, "path"_a, "Writes all layers as GeoTIFF, and a picture beside it (.png).");
   nb::class_<Mapper>(m, "StopMapper", "3D reconstruction of one stop: its views are merged and become a local map.")
-      .def("__init__",
-           [](Mapper* self, const MappingOptions* options, const DisparityOptions* disparity, std::optional<int> threads) {
-             new (self) Mapper(value_of(StopMapper::create(disparity == nullptr ? DisparityOptions() : *disparity,
-                                                           options == nullptr ? MappingOptions() : *options,
-                                                           thread_pool(threads))));
-           },
-           "options"_a.none() = nb::none(), "disparity"_a.none() = nb::none(), nb::kw_only(), "threads"_a = nb::none())
-      .def("add", add_view, "pair"_a, "nearest_m"_a = 0.0,
-           "Adds a view of the stop, whose disparities are computed. `nearest_m`: nearest depth; 0: disparities up to a "
-           "quarter of the width.")
+      .def(
+          "__init__",
+          [](Mapper* self, const MappingOptions* options, const DisparityOptions* disparity,
+             std::optional<int> threads) {
+            new (self) Mapper(
+                value_of(StopMapper::create(disparity == nullptr ? DisparityOptions() : *disparity,
+                                            options == nullptr ? MappingOptions() : *options, thread_pool(threads))));
+          },
+          "options"_a.none() = nb::none(), "disparity"_a.none() = nb::none(), nb::kw_only(), "threads"_a = nb::none())
+      .def(
+          "add", add_view, "pair"_a, "nearest_m"_a = 0.0,
+          "Adds a view of the stop, whose disparities are computed. `nearest_m`: nearest depth; 0: disparities up to a "
+          "quarter of the width.")
       .def("map", make_map, "map_from_body"_a = Pose(),
            "Merges the views into a map around the body, and begins a new stop. `map_from_body`: with z up.");
 }

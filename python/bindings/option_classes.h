@@ -55,7 +55,8 @@ class PropertyBinder {
     if (choices.empty()) return plain(key, value, meaning, "str");
     const std::ptrdiff_t at = offset(value);
     const std::string name(key);
-    add(key, meaning, literal_type(choices), [at](const Owner& o) { return part<std::string>(o, at); },
+    add(
+        key, meaning, literal_type(choices), [at](const Owner& o) { return part<std::string>(o, at); },
         [at, name, choices](Owner& o, const std::string& wanted) {
           check_choice(name, wanted, choices);
           part<std::string>(o, at) = wanted;
@@ -65,10 +66,12 @@ class PropertyBinder {
              Length length = {}) {
     const std::ptrdiff_t at = offset(value);
     const std::string name(key);
-    const std::string text = fmt::format("{}{}{}", length.exactly > 0 ? fmt::format("{} values", length.exactly) : "",
-                                         length.exactly > 0 && !bounds_text(bounds).empty() ? ", " : "",
-                                         bounds_text(bounds));
-    add(key, with_bounds(meaning, text), "list[float]", [at](const Owner& o) { return part<std::vector<double>>(o, at); },
+    const std::string text =
+        fmt::format("{}{}{}", length.exactly > 0 ? fmt::format("{} values", length.exactly) : "",
+                    length.exactly > 0 && !bounds_text(bounds).empty() ? ", " : "", bounds_text(bounds));
+    add(
+        key, with_bounds(meaning, text), "list[float]",
+        [at](const Owner& o) { return part<std::vector<double>>(o, at); },
         [at, name, bounds, length](Owner& o, std::vector<double> wanted) {
           if (length.exactly > 0 && static_cast<int>(wanted.size()) != length.exactly)
             throw nb::value_error(fmt::format("{}: must have {} values", name, length.exactly).c_str());
@@ -82,7 +85,8 @@ class PropertyBinder {
     const std::ptrdiff_t at = offset(value);
     const std::string name(key);
     const auto choices = options_detail::choices_of<Enum>();
-    add(key, meaning, literal_type(choices), [at](const Owner& o) { return std::string(name_of(part<Enum>(o, at))); },
+    add(
+        key, meaning, literal_type(choices), [at](const Owner& o) { return std::string(name_of(part<Enum>(o, at))); },
         [at, name, choices](Owner& o, const std::string& wanted) {
           check_choice(name, wanted, choices);
           part<Enum>(o, at) = *value_named<Enum>(wanted);
@@ -105,7 +109,8 @@ class PropertyBinder {
     bind_option_class<Group>(module_);
     const std::ptrdiff_t at = offset(values);
     const std::string item = unqualified_name(typeid(Group));
-    add(key, meaning, "list[" + item + "]", [at](const Owner& o) { return part<std::vector<Group>>(o, at); },
+    add(
+        key, meaning, "list[" + item + "]", [at](const Owner& o) { return part<std::vector<Group>>(o, at); },
         [at](Owner& o, std::vector<Group> wanted) { part<std::vector<Group>>(o, at) = std::move(wanted); });
   }
 
@@ -129,14 +134,16 @@ class PropertyBinder {
   template <class T>
   void plain(std::string_view key, T& value, std::string_view meaning, const char* type) {
     const std::ptrdiff_t at = offset(value);
-    add(key, fmt::format("{} Default: {}.", meaning, value), type, [at](const Owner& o) { return part<T>(o, at); },
+    add(
+        key, fmt::format("{} Default: {}.", meaning, value), type, [at](const Owner& o) { return part<T>(o, at); },
         [at](Owner& o, const T& wanted) { part<T>(o, at) = wanted; });
   }
   template <class T>
   void bounded(std::string_view key, T& value, std::string_view meaning, Bounds bounds, const char* type) {
     const std::ptrdiff_t at = offset(value);
     const std::string name(key);
-    add(key, with_bounds(fmt::format("{} Default: {}.", meaning, value), bounds_text(bounds)), type,
+    add(
+        key, with_bounds(fmt::format("{} Default: {}.", meaning, value), bounds_text(bounds)), type,
         [at](const Owner& o) { return part<T>(o, at); },
         [at, name, bounds](Owner& o, T wanted) {
           check_bounds(name, static_cast<double>(wanted), bounds);
@@ -178,10 +185,12 @@ void bind_option_class(nb::module_& m) {
         new (self) Options(nb::cast<const Options&>(made));
       },
       nb::sig("def __init__(self, **values: object) -> None"), "The defaults, but for the given values.");
-  bound.def("__eq__", [](const Options& a, const Options& b) { return dump_options(a) == dump_options(b); },
-            nb::is_operator());
+  bound.def(
+      "__eq__", [](const Options& a, const Options& b) { return dump_options(a) == dump_options(b); },
+      nb::is_operator());
   bound.def("__copy__", [](const Options& o) { return Options(o); });
-  bound.def("__deepcopy__", [](const Options& o, const nb::handle&) { return Options(o); }, nb::arg("memo"));
+  bound.def(
+      "__deepcopy__", [](const Options& o, const nb::handle&) { return Options(o); }, nb::arg("memo"));
   bound.def("__getstate__", [](const Options& o) { return dump_options(o); });
   bound.def("__setstate__", [](Options* self, const std::string& yaml) {
     new (self) Options(value_of(parse_options<Options>(yaml, "pickled options")));
@@ -194,15 +203,17 @@ void bind_option_class(nb::module_& m) {
     }
     return fmt::format("<{}:{}>", name, changed.empty() ? " defaults" : changed);
   });
-  bound.def("to_yaml", [](const Options& o) { return dump_options(o); }, "All options with their meanings as YAML.");
-  bound.def_static("from_yaml",
-                   [](const std::string& text) { return value_of(parse_options<Options>(text, "options")); },
-                   nb::arg("text"), "The options that a YAML text gives; all others have their defaults.");
-  bound.def_static("load", [](const std::string& path) { return value_of(load_options<Options>(path)); },
-                   nb::arg("path"), "The options of a YAML file.");
-  bound.def("set",
-            [](Options& o, const std::string& assignment) { o = value_of(set_option(o, assignment)); },
-            nb::arg("assignment"), "Applies one assignment of a command line, \"group.key=value\".");
+  bound.def(
+      "to_yaml", [](const Options& o) { return dump_options(o); }, "All options with their meanings as YAML.");
+  bound.def_static(
+      "from_yaml", [](const std::string& text) { return value_of(parse_options<Options>(text, "options")); },
+      nb::arg("text"), "The options that a YAML text gives; all others have their defaults.");
+  bound.def_static(
+      "load", [](const std::string& path) { return value_of(load_options<Options>(path)); }, nb::arg("path"),
+      "The options of a YAML file.");
+  bound.def(
+      "set", [](Options& o, const std::string& assignment) { o = value_of(set_option(o, assignment)); },
+      nb::arg("assignment"), "Applies one assignment of a command line, \"group.key=value\".");
 }
 
 }  // namespace spartan::python

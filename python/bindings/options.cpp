@@ -51,7 +51,8 @@ void check_choice(const std::string& key, const std::string& value, const std::v
 void set_attributes(nb::handle object, const nb::kwargs& values) {
   for (const auto& [key, value] : values) {
     if (!nb::hasattr(object, key)) {
-      throw nb::type_error(fmt::format("{} has no option '{}'", nb::cast<std::string>(nb::str(object.type().attr("__name__"))),
+      throw nb::type_error(fmt::format("{} has no option '{}'",
+                                       nb::cast<std::string>(nb::str(object.type().attr("__name__"))),
                                        nb::cast<std::string>(nb::str(key)))
                                .c_str());
     }

@@ -7,7 +7,8 @@
 
 namespace spartan::python {
 
-/// `layout`: "gray", "rgb", "bayer_rggb" …; `bits`: significant bits of a sample, 8 to 16. Raises ValueError for others.
+/// `layout`: "gray", "rgb", "bayer_rggb" …; `bits`: significant bits of a sample, 8 to 16. Raises ValueError for
+/// others.
 PixelFormat pixel_format(const std::string& layout, int bits);
 
 }  // namespace spartan::python

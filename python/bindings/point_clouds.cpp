@@ -58,29 +58,33 @@ void save(const PointCloudValue& cloud, const std::string& path) {
 
 void bind_point_clouds(nb::module_& m) {
   nb::class_<PointCloudValue>(m, "PointCloud", "Coloured points with the standard deviation of their range.")
-      .def_static("from_disparity", from_disparity, "disparity"_a, "sigma"_a, "left"_a, "geometry"_a,
-                  "target_from_left"_a = Pose(), "stamp_ns"_a = 0, nb::kw_only(), "step_px"_a = 1, "max_range_m"_a = 0.0,
-                  "Triangulates the pixels of a disparity image (float32, px) with their sigma; colours are gray levels of the "
-                  "rectified left image. `target_from_left` moves the points. `max_range_m`: 0 is no limit.")
-      .def_static("load", [](const std::string& path) { return PointCloudValue{value_of(read_ply(path))}; }, "path"_a,
-                  "Reads a PLY file that Spartan wrote.")
+      .def_static(
+          "from_disparity", from_disparity, "disparity"_a, "sigma"_a, "left"_a, "geometry"_a,
+          "target_from_left"_a = Pose(), "stamp_ns"_a = 0, nb::kw_only(), "step_px"_a = 1, "max_range_m"_a = 0.0,
+          "Triangulates the pixels of a disparity image (float32, px) with their sigma; colours are gray levels of the "
+          "rectified left image. `target_from_left` moves the points. `max_range_m`: 0 is no limit.")
+      .def_static(
+          "load", [](const std::string& path) { return PointCloudValue{value_of(read_ply(path))}; }, "path"_a,
+          "Reads a PLY file that Spartan wrote.")
       .def("save", save, "path"_a, "Writes a binary PLY or PCD file, by the extension.")
-      .def_prop_ro("positions",
-                   [](const nb::handle& self) { return column<float>(self, offsetof(ColouredPoint, position), 3); },
-                   nb::sig("def positions(self) -> numpy.typing.NDArray[numpy.float32]"), "Metres, float32, shape (n, 3).")
-      .def_prop_ro("colours",
-                   [](const nb::handle& self) { return column<std::uint8_t>(self, offsetof(ColouredPoint, colour), 3); },
-                   nb::sig("def colours(self) -> numpy.typing.NDArray[numpy.uint8]"), "RGB, uint8, shape (n, 3).")
-      .def_prop_ro("sigma_m",
-                   [](const nb::handle& self) { return column<float>(self, offsetof(ColouredPoint, sigma_m), 1); },
-                   nb::sig("def sigma_m(self) -> numpy.typing.NDArray[numpy.float32]"),
-                   "Standard deviation of the range, of map cells of the elevation; m, shape (n,).")
-      .def_prop_ro("times_s",
-                   [](const nb::handle& self) { return column<double>(self, offsetof(ColouredPoint, time_s), 1); },
-                   nb::sig("def times_s(self) -> numpy.typing.NDArray[numpy.float64]"),
-                   "Time of the image of each point, s, shape (n,).")
+      .def_prop_ro(
+          "positions", [](const nb::handle& self) { return column<float>(self, offsetof(ColouredPoint, position), 3); },
+          nb::sig("def positions(self) -> numpy.typing.NDArray[numpy.float32]"), "Metres, float32, shape (n, 3).")
+      .def_prop_ro(
+          "colours",
+          [](const nb::handle& self) { return column<std::uint8_t>(self, offsetof(ColouredPoint, colour), 3); },
+          nb::sig("def colours(self) -> numpy.typing.NDArray[numpy.uint8]"), "RGB, uint8, shape (n, 3).")
+      .def_prop_ro(
+          "sigma_m", [](const nb::handle& self) { return column<float>(self, offsetof(ColouredPoint, sigma_m), 1); },
+          nb::sig("def sigma_m(self) -> numpy.typing.NDArray[numpy.float32]"),
+          "Standard deviation of the range, of map cells of the elevation; m, shape (n,).")
+      .def_prop_ro(
+          "times_s", [](const nb::handle& self) { return column<double>(self, offsetof(ColouredPoint, time_s), 1); },
+          nb::sig("def times_s(self) -> numpy.typing.NDArray[numpy.float64]"),
+          "Time of the image of each point, s, shape (n,).")
       .def("__len__", [](const PointCloudValue& c) { return c.points.size(); })
-      .def("__repr__", [](const PointCloudValue& c) { return fmt::format("<PointCloud of {} points>", c.points.size()); });
+      .def("__repr__",
+           [](const PointCloudValue& c) { return fmt::format("<PointCloud of {} points>", c.points.size()); });
 }
 
 }  // namespace spartan::python

@@ -62,42 +62,49 @@ void bind_recordings(nb::module_& m) {
       .def("__next__", next_sample,
            nb::sig("def __next__(self) -> StereoFrame | ImuSample | WheelSample | CompassSample | InclinometerSample | "
                    "MissingFrame"));
-  nb::class_<RecordingValue>(m, "Recording",
-                             "Stereo frames and sensor samples of a recording in order of time, whatever its layout. Each "
-                             "iteration begins at the start; only the latest iterator may be used.")
+  nb::class_<RecordingValue>(
+      m, "Recording",
+      "Stereo frames and sensor samples of a recording in order of time, whatever its layout. Each "
+      "iteration begins at the start; only the latest iterator may be used.")
       .def_prop_ro("rig", [](const RecordingValue& r) { return r.info->rig; })
       .def_prop_ro("name", [](const RecordingValue& r) { return r.info->name; })
       .def_prop_ro("format", [](const RecordingValue& r) { return std::string(name_of(r.info->format)); })
-      .def_prop_ro("truth_file",
-                   [](const RecordingValue& r) -> std::optional<std::string> {
-                     const std::string& file = r.info->truth_file;
-                     return file.empty() ? std::nullopt : std::optional(file);
-                   },
-                   "Path of the true trajectory; None without one.")
-      .def_prop_ro("remarks", [](const RecordingValue& r) { return remarks(r.info->sequence); },
-                   "What is irregular or was assumed.")
-      .def("stamps_ns",
-           [](RecordingValue& r, const std::string& pair) {
-             std::vector<std::int64_t> stamps;
-             for (const Stamp& s : r.stream.use([&](auto& stream) { return stream->listed_stamps(pair); }))
-               stamps.push_back(s.ns);
-             return owned_array(std::move(stamps));
-           },
-           "pair"_a, "Stamps of the listed frames of a pair, int64, shape (n,).")
-      .def("frame_at",
-           [](RecordingValue& r, const std::string& pair, std::int64_t stamp) {
-             return r.stream.use([&](auto& stream) { return value_of(stream->frame_at(pair, Stamp{stamp})); });
-           },
-           "pair"_a, "stamp_ns"_a, "One frame, wherever the iteration is. Raises Error where there is none.")
-      .def("__iter__",
-           [](RecordingValue& r) {
-             check(r.stream.use([](auto& stream) { return stream->seek(0); }));
-             return SampleIterator{&r};
-           },
-           nb::keep_alive<0, 1>())
+      .def_prop_ro(
+          "truth_file",
+          [](const RecordingValue& r) -> std::optional<std::string> {
+            const std::string& file = r.info->truth_file;
+            return file.empty() ? std::nullopt : std::optional(file);
+          },
+          "Path of the true trajectory; None without one.")
+      .def_prop_ro(
+          "remarks", [](const RecordingValue& r) { return remarks(r.info->sequence); },
+          "What is irregular or was assumed.")
+      .def(
+          "stamps_ns",
+          [](RecordingValue& r, const std::string& pair) {
+            std::vector<std::int64_t> stamps;
+            for (const Stamp& s : r.stream.use([&](auto& stream) { return stream->listed_stamps(pair); }))
+              stamps.push_back(s.ns);
+            return owned_array(std::move(stamps));
+          },
+          "pair"_a, "Stamps of the listed frames of a pair, int64, shape (n,).")
+      .def(
+          "frame_at",
+          [](RecordingValue& r, const std::string& pair, std::int64_t stamp) {
+            return r.stream.use([&](auto& stream) { return value_of(stream->frame_at(pair, Stamp{stamp})); });
+          },
+          "pair"_a, "stamp_ns"_a, "One frame, wherever the iteration is. Raises Error where there is none.")
+      .def(
+          "__iter__",
+          [](RecordingValue& r) {
+            check(r.stream.use([](auto& stream) { return stream->seek(0); }));
+            return SampleIterator{&r};
+          },
+          nb::keep_alive<0, 1>())
       .def("__repr__", [](const RecordingValue& r) {
         const RecordingInfo& info = *r.info;
-        return fmt::format("<Recording '{}' ({}): {} frames>", info.name, name_of(info.format), info.sequence.announced);
+        return fmt::format("<Recording '{}' ({}): {} frames>", info.name, name_of(info.format),
+                           info.sequence.announced);
       });
   m.def(
       "open_recording",
@@ -110,7 +117,8 @@ void bind_recordings(nb::module_& m) {
       "path"_a, nb::kw_only(), "rig"_a = nb::none(), "format"_a = nb::none(), "left"_a = nb::none(),
       "right"_a = nb::none(), "fps"_a = 0.0,
       "Opens a folder or a video file; the layout (Spartan, KITTI, EuRoC, image folders …) is detected. `rig`: a "
-      "calibration file to use instead of the recording's own. `left`, `right`: folders or patterns of file names of the "
+      "calibration file to use instead of the recording's own. `left`, `right`: folders or patterns of file names of "
+      "the "
       "images.");
 }
 

@@ -1,5 +1,3 @@
-#include "spartan/rig/rig.h"
-
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
@@ -17,6 +15,7 @@
 #include "bindings/errors.h"
 #include "bindings/pixel_format.h"
 #include "spartan/rig/describe.h"
+#include "spartan/rig/rig.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -34,23 +33,27 @@ const Item& named(const Item* found, const std::string& name) {
 
 void bind_parts(nb::module_& m) {
   nb::class_<Camera>(m, "Camera", "One camera of a rig: its model, image size, and pose on its mount.")
-      .def("__init__",
-           [](Camera* self, const std::string& name, const Size& size, const CameraModelValue& model,
-              const std::string& layout, int bits) {
-             new (self) Camera{};
-             self->name = name;
-             self->size = {size.first, size.second};
-             self->model = model.model;
-             self->pixel_format = pixel_format(layout, bits);
-           },
-           "name"_a, "size"_a, "model"_a, nb::kw_only(), "layout"_a = "gray", "bits"_a = 8,
-           "`size`: (width, height) in pixels; `layout` and `bits`: of its images, see StereoFrame.")
+      .def(
+          "__init__",
+          [](Camera* self, const std::string& name, const Size& size, const CameraModelValue& model,
+             const std::string& layout, int bits) {
+            new (self) Camera{};
+            self->name = name;
+            self->size = {size.first, size.second};
+            self->model = model.model;
+            self->pixel_format = pixel_format(layout, bits);
+          },
+          "name"_a, "size"_a, "model"_a, nb::kw_only(), "layout"_a = "gray", "bits"_a = 8,
+          "`size`: (width, height) in pixels; `layout` and `bits`: of its images, see StereoFrame.")
       .def_ro("name", &Camera::name)
-      .def_prop_ro("size", [](const Camera& c) { return Size(c.size.width, c.size.height); }, "(width, height), px")
+      .def_prop_ro(
+          "size", [](const Camera& c) { return Size(c.size.width, c.size.height); }, "(width, height), px")
       .def_prop_ro("model", [](const Camera& c) { return CameraModelValue{c.model}; })
-      .def_prop_ro("layout", [](const Camera& c) { return std::string(name_of(c.pixel_format.layout)); },
-                   "`gray`, `rgb`, or a Bayer pattern such as `bayer_rggb`.")
-      .def_prop_ro("bits", [](const Camera& c) { return c.pixel_format.bits; }, "Significant bits of a sample.")
+      .def_prop_ro(
+          "layout", [](const Camera& c) { return std::string(name_of(c.pixel_format.layout)); },
+          "`gray`, `rgb`, or a Bayer pattern such as `bayer_rggb`.")
+      .def_prop_ro(
+          "bits", [](const Camera& c) { return c.pixel_format.bits; }, "Significant bits of a sample.")
       .def_ro("mount", &Camera::mount, "`body` or the name of a pan-tilt unit.")
       .def_ro("mount_from_camera", &Camera::mount_from_camera)
       .def("__repr__", [](const Camera& c) {
@@ -76,39 +79,52 @@ Rig stereo_rig(const Camera& left, const Camera& right, const Pose& right_from_l
 
 void bind_rigs(nb::module_& m) {
   bind_parts(m);
-  nb::class_<Rig>(m, "Rig",
-                  "All cameras of a rover and their geometry. The body frame is x forward, y left, z up. To change a rig, "
-                  "change its YAML.")
-      .def_static("stereo", stereo_rig, "left"_a, "right"_a, "right_from_left"_a, "name"_a = "stereo",
-                  "A rig of two cameras; the body is the left camera turned to x forward, y left, z up. Raises Error where "
-                  "the rig is not possible.")
-      .def_static("from_yaml",
-                  [](const std::string& text) { return value_of(parse_rig_yaml(text, "rig.yaml")); }, "text"_a,
-                  "Reads a rig.yaml. Raises Error with all faults of the text.")
-      .def("to_yaml", [](const Rig& r) { return to_rig_yaml(r); }, "The rig as rig.yaml; from_yaml() restores it bit for bit.")
+  nb::class_<Rig>(
+      m, "Rig",
+      "All cameras of a rover and their geometry. The body frame is x forward, y left, z up. To change a rig, "
+      "change its YAML.")
+      .def_static(
+          "stereo", stereo_rig, "left"_a, "right"_a, "right_from_left"_a, "name"_a = "stereo",
+          "A rig of two cameras; the body is the left camera turned to x forward, y left, z up. Raises Error where "
+          "the rig is not possible.")
+      .def_static(
+          "from_yaml", [](const std::string& text) { return value_of(parse_rig_yaml(text, "rig.yaml")); }, "text"_a,
+          "Reads a rig.yaml. Raises Error with all faults of the text.")
+      .def(
+          "to_yaml", [](const Rig& r) { return to_rig_yaml(r); },
+          "The rig as rig.yaml; from_yaml() restores it bit for bit.")
       .def_ro("name", &Rig::name)
       .def_prop_ro("cameras", [](const Rig& r) { return r.cameras; })
       .def_prop_ro("pairs", [](const Rig& r) { return r.pairs; })
-      .def("camera", [](const Rig& r, const std::string& name) { return named(r.find_camera(name), name); }, "name"_a,
-           "Raises KeyError for an unknown name.")
-      .def("pair", [](const Rig& r, const std::string& name) { return named(r.find_pair(name), name); }, "name"_a,
-           "Raises KeyError for an unknown name.")
-      .def("body_from_camera",
-           [](const Rig& r, const std::string& name, const std::optional<double>& pan, const std::optional<double>& tilt) {
-             named(r.find_camera(name), name);
-             return pan || tilt ? r.body_from_camera(name, pan.value_or(0), tilt.value_or(0)) : r.body_from_camera(name);
-           },
-           "camera"_a, "pan_rad"_a = nb::none(), "tilt_rad"_a = nb::none(),
-           "Pose of a camera, at the rest angles of its pan-tilt unit or at the given ones.")
-      .def("right_from_left",
-           [](const Rig& r, const std::string& pair) { return r.right_from_left(named(r.find_pair(pair), pair)); }, "pair"_a)
-      .def("baseline_m",
-           [](const Rig& r, const std::string& pair) {
-             return r.right_from_left(named(r.find_pair(pair), pair)).translation().norm();
-           },
-           "pair"_a, "Distance of the two cameras of a pair, m.")
-      .def("describe", [](const Rig& r) { return describe_rig(r); }, "Lines of text about every camera and pair.")
-      .def("__eq__", [](const Rig& a, const Rig& b) { return a == b; }, nb::is_operator())
+      .def(
+          "camera", [](const Rig& r, const std::string& name) { return named(r.find_camera(name), name); }, "name"_a,
+          "Raises KeyError for an unknown name.")
+      .def(
+          "pair", [](const Rig& r, const std::string& name) { return named(r.find_pair(name), name); }, "name"_a,
+          "Raises KeyError for an unknown name.")
+      .def(
+          "body_from_camera",
+          [](const Rig& r, const std::string& name, const std::optional<double>& pan,
+             const std::optional<double>& tilt) {
+            named(r.find_camera(name), name);
+            return pan || tilt ? r.body_from_camera(name, pan.value_or(0), tilt.value_or(0)) : r.body_from_camera(name);
+          },
+          "camera"_a, "pan_rad"_a = nb::none(), "tilt_rad"_a = nb::none(),
+          "Pose of a camera, at the rest angles of its pan-tilt unit or at the given ones.")
+      .def(
+          "right_from_left",
+          [](const Rig& r, const std::string& pair) { return r.right_from_left(named(r.find_pair(pair), pair)); },
+          "pair"_a)
+      .def(
+          "baseline_m",
+          [](const Rig& r, const std::string& pair) {
+            return r.right_from_left(named(r.find_pair(pair), pair)).translation().norm();
+          },
+          "pair"_a, "Distance of the two cameras of a pair, m.")
+      .def(
+          "describe", [](const Rig& r) { return describe_rig(r); }, "Lines of text about every camera and pair.")
+      .def(
+          "__eq__", [](const Rig& a, const Rig& b) { return a == b; }, nb::is_operator())
       .def("__getstate__", [](const Rig& r) { return to_rig_yaml(r); })
       .def("__setstate__",
            [](Rig* self, const std::string& yaml) { new (self) Rig(value_of(parse_rig_yaml(yaml, "pickled rig"))); })

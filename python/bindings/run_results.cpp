@@ -65,7 +65,7 @@ std::vector<std::string> kinds(const RunResults& run) {
 }
 
 nb::ndarray<nb::numpy, double, nb::shape<-1, 6, 6>> covariances(const RunResults& run,
-                                                               const std::optional<std::string>& name) {
+                                                                const std::optional<std::string>& name) {
   const TrajectoryKind kind = kind_of(run, name);
   auto* const values = new std::vector<double>();
   const nb::capsule owner(values, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
@@ -100,22 +100,25 @@ nb::dict times(const FrameRecord& frame) {
 }
 
 void bind_records(nb::module_& m) {
-  nb::class_<FrameRecord>(m, "FrameRecord", "A frame that was processed, or one that the recording lists and that is missing.")
+  nb::class_<FrameRecord>(m, "FrameRecord",
+                          "A frame that was processed, or one that the recording lists and that is missing.")
       .def_ro("frame_id", &FrameRecord::frame_id)
       .def_ro("pair", &FrameRecord::pair)
       .def_prop_ro("stamp_ns", [](const FrameRecord& f) { return f.stamp.ns; })
-      .def_ro("status", &FrameRecord::status, "Of the odometry: `tracking`, `degraded`, `lost`, `stationary`, or `missing`.")
+      .def_ro("status", &FrameRecord::status,
+              "Of the odometry: `tracking`, `degraded`, `lost`, `stationary`, or `missing`.")
       .def_ro("fault", &FrameRecord::fault, "Why the frame or one of its images is missing; empty otherwise.")
       .def_ro("message", &FrameRecord::message)
       .def_ro("has_pose", &FrameRecord::has_pose, "False: the pose of the odometry is predicted.")
       .def_ro("odometry", &FrameRecord::world_from_body, "world_from_body, UncertainPose")
       .def_ro("motion", &FrameRecord::motion)
       .def_ro("slam", &FrameRecord::slam, "world_from_body, UncertainPose; None where it is missing.")
-      .def_prop_ro("localization",
-                   [](const FrameRecord& f) {
-                     return f.localization ? std::optional(f.localization->world_from_body) : std::nullopt;
-                   },
-                   "world_from_body, UncertainPose; None where it is missing.")
+      .def_prop_ro(
+          "localization",
+          [](const FrameRecord& f) {
+            return f.localization ? std::optional(f.localization->world_from_body) : std::nullopt;
+          },
+          "world_from_body, UncertainPose; None where it is missing.")
       .def_ro("smoothed", &FrameRecord::smoothed, "world_from_body, UncertainPose; None before the end of the run.")
       .def_prop_ro("sensors", sensors, nb::sig("def sensors(self) -> dict[str, tuple[str, str]]"),
                    "State and reason of each sensor of the localization.")
@@ -140,11 +143,14 @@ void bind_records(nb::module_& m) {
 void bind_run_results(nb::module_& m) {
   bind_records(m);
   nb::class_<RunResults>(m, "RunResults", "The records of a run folder; see spartan.Run.")
-      .def("__init__", [](RunResults* self, const std::string& path) { new (self) RunResults(open_results(path)); }, "path"_a)
+      .def(
+          "__init__", [](RunResults* self, const std::string& path) { new (self) RunResults(open_results(path)); },
+          "path"_a)
       .def_prop_ro("path", [](const RunResults& r) { return r.folder.path; })
-      .def_prop_ro("frames", [](RunResults& r) { return nb::cast(r.frames); },
-                   nb::sig("def frames(self) -> list[FrameRecord]"))
-      .def_prop_ro("stops", [](RunResults& r) { return nb::cast(r.maps); }, nb::sig("def stops(self) -> list[MapRecord]"))
+      .def_prop_ro(
+          "frames", [](RunResults& r) { return nb::cast(r.frames); }, nb::sig("def frames(self) -> list[FrameRecord]"))
+      .def_prop_ro(
+          "stops", [](RunResults& r) { return nb::cast(r.maps); }, nb::sig("def stops(self) -> list[MapRecord]"))
       .def_prop_ro("terrain_stamps_ns",
                    [](const RunResults& r) {
                      std::vector<std::int64_t> stamps;
@@ -154,11 +160,12 @@ void bind_run_results(nb::module_& m) {
       .def_prop_ro("rig", [](const RunResults& r) { return value_of(read_rig_yaml(r.folder.rig())); })
       .def_prop_ro("options", [](const RunResults& r) { return value_of(load_options<RunOptions>(r.folder.config())); })
       .def_prop_ro("trajectories", kinds)
-      .def("trajectory",
-           [](const RunResults& r, const std::optional<std::string>& name) {
-             return TrajectoryValue{trajectory_of(r.frames, kind_of(r, name))};
-           },
-           "kind"_a = nb::none())
+      .def(
+          "trajectory",
+          [](const RunResults& r, const std::optional<std::string>& name) {
+            return TrajectoryValue{trajectory_of(r.frames, kind_of(r, name))};
+          },
+          "kind"_a = nb::none())
       .def("covariances", covariances, "kind"_a = nb::none())
       .def("export", export_to, "format"_a, "path"_a, "trajectory"_a = nb::none(), "threads"_a = nb::none());
 }

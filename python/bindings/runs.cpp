@@ -1,6 +1,4 @@
 // spartan.run(): a whole recording or live stream into a run folder.
-#include "spartan/system/run.h"
-
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
@@ -22,6 +20,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/report/report.h"
+#include "spartan/system/run.h"
 #include "spartan/system/run_folder.h"
 #ifdef SPARTAN_HAS_SIM
 #include "program/simulation_plan.h"
@@ -134,8 +133,8 @@ void bind_runs(nb::module_& m) {
       [](const std::string& input, const std::string& output, const RunOptions* options,
          const std::optional<std::string>& rig, const std::optional<std::string>& format,
          const std::optional<std::string>& left, const std::optional<std::string>& right, double fps,
-         std::optional<int> threads, int max_frames, bool resume, bool replace, double speed, const nb::object& progress,
-         const nb::object& frame) {
+         std::optional<int> threads, int max_frames, bool resume, bool replace, double speed,
+         const nb::object& progress, const nb::object& frame) {
         if (max_frames < 0) throw nb::value_error("max_frames: must not be negative");
         RunRequest request;
         request.threads = thread_count(threads);
@@ -146,10 +145,10 @@ void bind_runs(nb::module_& m) {
         return run_folder(input, output, options, open_options(rig, format, left, right, fps), request, speed, progress,
                           frame);
       },
-      "input"_a, "output"_a, "options"_a.none() = nb::none(), nb::kw_only(), "rig"_a = nb::none(), "format"_a = nb::none(),
-      "left"_a = nb::none(), "right"_a = nb::none(), "fps"_a = 0.0, "threads"_a = nb::none(), "max_frames"_a = 0,
-      "resume"_a = false, "replace"_a = false, "speed"_a = 1.0, "progress"_a = nb::none(), "frame"_a = nb::none(),
-      "See spartan.run(). Returns the text of summary.json.");
+      "input"_a, "output"_a, "options"_a.none() = nb::none(), nb::kw_only(), "rig"_a = nb::none(),
+      "format"_a = nb::none(), "left"_a = nb::none(), "right"_a = nb::none(), "fps"_a = 0.0, "threads"_a = nb::none(),
+      "max_frames"_a = 0, "resume"_a = false, "replace"_a = false, "speed"_a = 1.0, "progress"_a = nb::none(),
+      "frame"_a = nb::none(), "See spartan.run(). Returns the text of summary.json.");
   m.def("write_report", report, "run"_a, "recording"_a, "truth"_a = nb::none(), "page"_a, "threads"_a = nb::none(),
         "Writes the report page of a run folder.");
 }

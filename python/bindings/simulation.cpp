@@ -43,7 +43,8 @@ std::int64_t simulate(const std::string& scenario, const std::string& output, co
 #else
 std::int64_t simulate(const std::string&, const std::string&, const std::vector<std::string>&, std::optional<int>, bool,
                       std::optional<int>, const nb::object&) {
-  throw RaisedError(Error{ErrorCode::usage, "this build has no simulator", {}, "install libembree-dev and build again"});
+  throw RaisedError(
+      Error{ErrorCode::usage, "this build has no simulator", {}, "install libembree-dev and build again"});
 }
 #endif
 
@@ -52,8 +53,10 @@ std::int64_t simulate(const std::string&, const std::string&, const std::vector<
 void bind_simulation(nb::module_& m) {
   m.def("simulate", simulate, "scenario"_a, "output"_a, nb::kw_only(), "set"_a = std::vector<std::string>(),
         "seed"_a = nb::none(), "resume"_a = false, "threads"_a = nb::none(), "progress"_a = nb::none(),
-        "Simulates a drive: a recording with exact ground truth in the folder `output`. `scenario`: the name of a shipped one "
-        "(`quick` …) or a file. `set`: changed keys, \"path.length_m=6\". `progress`: called with the frames that are done and "
+        "Simulates a drive: a recording with exact ground truth in the folder `output`. `scenario`: the name of a "
+        "shipped one "
+        "(`quick` …) or a file. `set`: changed keys, \"path.length_m=6\". `progress`: called with the frames that are "
+        "done and "
         "their number. Returns the number of frames.");
 }
 

@@ -1,5 +1,3 @@
-#include "spartan/core/trajectory.h"
-
 #include <fmt/format.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
@@ -15,6 +13,7 @@
 #include "bindings/errors.h"
 #include "bindings/trajectory.h"
 #include "spartan/core/files.h"
+#include "spartan/core/trajectory.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -83,25 +82,30 @@ void save(const TrajectoryValue& t, const std::string& path, const std::string& 
 
 void bind_trajectories(nb::module_& m) {
   nb::class_<StampedPose>(m, "StampedPose", "A pose with its time.")
-      .def_prop_ro("stamp_ns", [](const StampedPose& p) { return p.stamp.ns; }, "Nanoseconds.")
+      .def_prop_ro(
+          "stamp_ns", [](const StampedPose& p) { return p.stamp.ns; }, "Nanoseconds.")
       .def_ro("pose", &StampedPose::pose, "world_from_body")
       .def("__repr__", [](const StampedPose& p) { return "<pose at " + to_decimal_seconds(p.stamp) + " s>"; });
-  nb::class_<TrajectoryValue>(m, "Trajectory", "Poses with increasing stamps: `world_from_body`, a sequence of StampedPose.")
-      .def("__init__",
-           [](TrajectoryValue* self, const StampArray& stamps, const NumberArray& p, const NumberArray& q) {
-             new (self) TrajectoryValue(from_arrays(stamps, p, q));
-           },
-           "stamps_ns"_a, "positions"_a, "quaternions_xyzw"_a,
-           "Stamps in nanoseconds, int64, shape (n,); positions in metres, shape (n, 3); quaternions, shape (n, 4).")
-      .def_static("load", [](const std::string& path) { return TrajectoryValue{value_of(load_trajectory(path)).poses}; },
-                  "path"_a,
-                  "Reads a trajectory in the format of TUM, KITTI (with `times.txt` beside it) or EuRoC, told by the content.")
+  nb::class_<TrajectoryValue>(m, "Trajectory",
+                              "Poses with increasing stamps: `world_from_body`, a sequence of StampedPose.")
+      .def(
+          "__init__",
+          [](TrajectoryValue* self, const StampArray& stamps, const NumberArray& p, const NumberArray& q) {
+            new (self) TrajectoryValue(from_arrays(stamps, p, q));
+          },
+          "stamps_ns"_a, "positions"_a, "quaternions_xyzw"_a,
+          "Stamps in nanoseconds, int64, shape (n,); positions in metres, shape (n, 3); quaternions, shape (n, 4).")
+      .def_static(
+          "load", [](const std::string& path) { return TrajectoryValue{value_of(load_trajectory(path)).poses}; },
+          "path"_a,
+          "Reads a trajectory in the format of TUM, KITTI (with `times.txt` beside it) or EuRoC, told by the content.")
       .def("save", save, "path"_a, "format"_a = "tum", "Writes it in the format `tum`, `kitti` or `euroc`.")
       .def_prop_ro("stamps_ns", stamps_ns, "Nanoseconds, int64, shape (n,).")
       .def_prop_ro("positions", positions, "Metres, shape (n, 3).")
       .def_prop_ro("quaternions_xyzw", quaternions, "Unit quaternions, shape (n, 4).")
-      .def_prop_ro("length_m", [](const TrajectoryValue& t) { return path_length(t.poses); },
-                   "Length of the line through the positions, m.")
+      .def_prop_ro(
+          "length_m", [](const TrajectoryValue& t) { return path_length(t.poses); },
+          "Length of the line through the positions, m.")
       .def("__len__", [](const TrajectoryValue& t) { return t.poses.size(); })
       .def("__getitem__", at, "index"_a, nb::rv_policy::copy)
       .def("__repr__", [](const TrajectoryValue& t) {

@@ -15,8 +15,8 @@ struct SimulationPlan {
   std::vector<std::string> warnings;  ///< of former keys
 };
 
-/// Reads and checks a scenario, the name of a shipped one or a file, with `assignments` "group.key=value". Codes: `input`
-/// (no such scenario), `configuration`, `usage` (an assignment).
+/// Reads and checks a scenario, the name of a shipped one or a file, with `assignments` "group.key=value". Codes:
+/// `input` (no such scenario), `configuration`, `usage` (an assignment).
 Result<SimulationPlan> plan_simulation(const std::string& name, std::optional<int> seed,
                                        const std::vector<std::string>& assignments);
 
