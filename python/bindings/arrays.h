@@ -20,7 +20,7 @@ namespace spartan::python {
 namespace nb = nanobind;
 
 /// An array of any type and shape; its values are only read.
-using AnyArray = nb::ndarray<nb::ro, nb::device::cpu>;
+struct AnyArray : nb::ndarray<nb::ro, nb::device::cpu> {};
 /// Pixels of one channel (height, width); of three (height, width, 3).
 template <class T>
 using ImageArray = nb::ndarray<nb::numpy, T, nb::ndim<2>>;
@@ -149,6 +149,15 @@ auto matrix_array(const Matrix& matrix) {
 }  // namespace spartan::python
 
 namespace nanobind::detail {
+
+template <>
+struct type_caster<spartan::python::AnyArray> {
+  NB_TYPE_CASTER(spartan::python::AnyArray, const_name("numpy.typing.NDArray[typing.Any]"))
+
+  bool from_python(handle source, std::uint8_t, cleanup_list*) noexcept {
+    return try_cast(source, static_cast<ndarray<ro, device::cpu>&>(value), false);
+  }
+};
 
 template <>
 struct type_caster<spartan::python::NumberArray> {

@@ -15,6 +15,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
+#include "bindings/path_text.h"
 #include "bindings/threads.h"
 #include "spartan/calibration/pair_check.h"
 #include "spartan/calibration_io/calibration_files.h"
@@ -41,13 +42,13 @@ CalibrationFormat format_named(const std::string& name) {
   throw nb::value_error(fmt::format("format = '{}': must be one of {}", name, names).c_str());
 }
 
-LoadedRig read(const std::string& path, const std::optional<std::string>& format, const std::optional<Size>& size) {
+LoadedRig read(const PathText& path, const std::optional<std::string>& format, const std::optional<Size>& size) {
   return value_of(format ? read_calibration_as(format_named(*format), path, size_of(size))
                          : read_calibration(path, size_of(size)));
 }
 
 // What the files do not represent, as they were read again before they were written.
-std::vector<std::string> write(const Rig& rig, const std::string& path, const std::optional<std::string>& name) {
+std::vector<std::string> write(const Rig& rig, const PathText& path, const std::optional<std::string>& name) {
   const CalibrationFormat format = name ? format_named(*name) : value_of(calibration_format_for_path(path));
   const CalibrationFiles files = value_of(to_calibration_files(rig, format, path));
   const LoadedRig again = value_of(read_back(files, format, rig.cameras.empty() ? ImageSize{} : rig.cameras[0].size));
@@ -140,7 +141,7 @@ void bind_calibrations(nb::module_& m) {
       "name and content. `path`: a file, a folder, or \"LEFT,RIGHT\". `size`: (width, height) for formats without it.");
   m.def(
       "read_rig",
-      [](const std::string& path, const std::optional<Size>& size) { return value_of(read_rig(path, size_of(size))); },
+      [](const PathText& path, const std::optional<Size>& size) { return value_of(read_rig(path, size_of(size))); },
       "path"_a, "size"_a = nb::none(), "The rig of read_calibration().");
   m.def("write_calibration", write, "rig"_a, "path"_a, "format"_a = nb::none(),
         "Writes a rig in a format, chosen by the name of the file or given. Returns what the format does not "

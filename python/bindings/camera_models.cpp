@@ -161,7 +161,7 @@ void bind_camera_models(nb::module_& m) {
           "The names of all models.")
       .def(
           "__eq__", [](const CameraModelValue& a, const CameraModelValue& b) { return a.model == b.model; },
-          nb::is_operator())
+          nb::is_operator(), nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("__repr__", repr);
 }
 

@@ -11,6 +11,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
+#include "bindings/path_text.h"
 #include "bindings/trajectory.h"
 #include "spartan/eval/disparity_metrics.h"
 #include "spartan/eval/trajectory_metrics.h"
@@ -40,7 +41,7 @@ TrajectoryMetrics evaluate(const TrajectoryValue& estimate, const TrajectoryValu
   return value_of(compare_trajectories(estimate.poses, truth.poses, options));
 }
 
-TrajectoryMetrics evaluate_files(const std::string& estimate, const std::string& truth, const std::string& align,
+TrajectoryMetrics evaluate_files(const PathText& estimate, const PathText& truth, const std::string& align,
                                  const std::optional<std::vector<double>>& segments, bool kitti, double max_dt_s,
                                  const std::string& kind) {
   const TrajectoryMetricsOptions options = metrics_options(align, segments, kitti, max_dt_s);
@@ -50,7 +51,7 @@ TrajectoryMetrics evaluate_files(const std::string& estimate, const std::string&
 }
 
 void bind_trajectory_metrics(nb::module_& m) {
-  nb::class_<ErrorStatistics>(m, "ErrorStatistics")
+  nb::class_<ErrorStatistics>(m, "ErrorStatistics", "Statistics of the errors of all poses.")
       .def_ro("rmse", &ErrorStatistics::rmse)
       .def_ro("mean", &ErrorStatistics::mean)
       .def_ro("median", &ErrorStatistics::median)
@@ -109,7 +110,7 @@ void bind_disparity_metrics(nb::module_& m) {
       .def_ro("density_percent", &DisparityScores::density_percent)
       .def_ro("rms_in_1px", &DisparityScores::rms_in_1px, "RMS error of the pixels with an error up to 1 px, px.")
       .def_ro("mean_abs_px", &DisparityScores::mean_abs_px);
-  nb::class_<DisparityMetrics>(m, "DisparityMetrics")
+  nb::class_<DisparityMetrics>(m, "DisparityMetrics", "Errors of a disparity image against the truth.")
       .def_ro("all", &DisparityMetrics::all)
       .def_ro("nonocc", &DisparityMetrics::nonocc, "Pixels that both cameras see; None without a mask.");
   m.def(
@@ -124,8 +125,8 @@ void bind_disparity_metrics(nb::module_& m) {
       "truth.");
   m.def(
       "read_disparity",
-      [](const std::string& path, double scale) { return owned_array(value_of(read_disparity(path, scale))); },
-      "path"_a, "scale_of_8_bit"_a = 1.0,
+      [](const PathText& path, double scale) { return owned_array(value_of(read_disparity(path, scale))); }, "path"_a,
+      "scale_of_8_bit"_a = 1.0,
       "Reads disparities in px, NaN where unknown: PFM, 16-bit PNG (value / 256), 8-bit PNG (value / scale).");
 }
 

@@ -16,6 +16,7 @@
 #include "bindings/errors.h"
 #include "bindings/guarded.h"
 #include "bindings/map_layers.h"
+#include "bindings/path_text.h"
 #include "bindings/threads.h"
 #include "spartan/system/map_files.h"
 
@@ -51,7 +52,7 @@ std::unique_ptr<MapViewValue> view(MapValue& map, const std::optional<Window>& w
   });
 }
 
-void export_to(MapValue& map, const std::string& path, const std::optional<Window>& wanted,
+void export_to(MapValue& map, const PathText& path, const std::optional<Window>& wanted,
                const std::vector<std::string>& layers) {
   check(map.use([&](SavedMap& saved) -> Status {
     MapExport request;
@@ -109,7 +110,7 @@ void bind_global_maps(nb::module_& m) {
                        "The global map of a run or of a map file; its tiles are read where they are needed.")
       .def_static(
           "open",
-          [](const std::string& path) {
+          [](const PathText& path) {
             const nb::gil_scoped_release free;
             return std::make_unique<MapValue>(value_of(SavedMap::open(path)));
           },

@@ -11,6 +11,7 @@
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
 #include "bindings/guarded.h"
+#include "bindings/path_text.h"
 #include "bindings/rectified_pair.h"
 #include "bindings/threads.h"
 #include "spartan/imaging/imager.h"
@@ -89,7 +90,8 @@ void bind_geometry(nb::module_& m) {
           "size", [](const RectifiedStereo& g) { return std::pair(g.size.width, g.size.height); },
           "(width, height), px")
       .def_ro("focal_px", &RectifiedStereo::focal_px)
-      .def_prop_ro("centre_px", [](const RectifiedStereo& g) { return matrix_array(g.centre_px); })
+      .def_prop_ro(
+          "centre_px", [](const RectifiedStereo& g) { return matrix_array(g.centre_px); }, nb::rv_policy::automatic)
       .def_ro("baseline_m", &RectifiedStereo::baseline_m)
       .def("triangulate", triangulate, "uvd"_a,
            "Points of the left optical frame (m) of pixels and disparities (u, v, d), both of shape (n, 3); NaN for d "
@@ -147,7 +149,7 @@ void bind_imaging(nb::module_& m) {
       .def(
           "__init__",
           [](Guarded<Imager>* self, const Rig& rig, const ImagingOptions* options, std::optional<int> threads,
-             const std::string& masks) {
+             const PathText& masks) {
             const ImagingOptions chosen = options == nullptr ? ImagingOptions() : *options;
             const ThreadPool workers = thread_pool(threads);
             const nb::gil_scoped_release free;

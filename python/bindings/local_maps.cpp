@@ -15,6 +15,7 @@
 #include "bindings/errors.h"
 #include "bindings/guarded.h"
 #include "bindings/map_layers.h"
+#include "bindings/path_text.h"
 #include "bindings/rectified_pair.h"
 #include "bindings/threads.h"
 #include "spartan/core/files.h"
@@ -73,7 +74,7 @@ LocalMapValue make_map(Mapper& mapper, const Pose& map_from_body) {
   });
 }
 
-void save(const LocalMapValue& map, const std::string& path) {
+void save(const LocalMapValue& map, const PathText& path) {
   std::string stem = path;
   if (stem.ends_with(".tif")) stem.resize(stem.size() - 4);
   check(write_local_map(map.map, {}, stem));
@@ -82,7 +83,8 @@ void save(const LocalMapValue& map, const std::string& path) {
 void bind_obstacles(nb::module_& m) {
   nb::class_<Obstacle>(m, "Obstacle", "Connected cells of a map that are obstacles.")
       .def_prop_ro(
-          "middle_m", [](const Obstacle& o) { return matrix_array(o.middle_m); }, "x and y of its middle, m.")
+          "middle_m", [](const Obstacle& o) { return matrix_array(o.middle_m); }, "x and y of its middle, m.",
+          nb::rv_policy::automatic)
       .def_ro("width_m", &Obstacle::width_m, "Along x.")
       .def_ro("length_m", &Obstacle::length_m, "Along y.")
       .def_ro("height_m", &Obstacle::height_m, "Above the ground.")

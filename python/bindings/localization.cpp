@@ -47,18 +47,22 @@ void bind_estimate(nb::module_& m) {
       .def_ro("odom_from_body", &LocalizationEstimate::odom_from_body, "UncertainPose that never jumps.")
       .def_prop_ro(
           "velocity_m_s", [](const LocalizationEstimate& e) { return matrix_array(e.velocity_m_s); },
-          "Of the body in the world, m/s.")
+          "Of the body in the world, m/s.", nb::rv_policy::automatic)
       .def_prop_ro(
           "velocity_covariance", [](const LocalizationEstimate& e) { return matrix_array(e.velocity_covariance); },
-          "Shape (3, 3), m²/s².")
+          "Shape (3, 3), m²/s².", nb::rv_policy::automatic)
       .def_ro("imu_aligned", &LocalizationEstimate::imu_aligned)
-      .def_prop_ro("gyro_bias_rad_s", [](const LocalizationEstimate& e) { return matrix_array(e.biases.gyro_rad_s); })
-      .def_prop_ro("accel_bias_m_s2", [](const LocalizationEstimate& e) { return matrix_array(e.biases.accel_m_s2); })
+      .def_prop_ro(
+          "gyro_bias_rad_s", [](const LocalizationEstimate& e) { return matrix_array(e.biases.gyro_rad_s); },
+          nb::rv_policy::automatic)
+      .def_prop_ro(
+          "accel_bias_m_s2", [](const LocalizationEstimate& e) { return matrix_array(e.biases.accel_m_s2); },
+          nb::rv_policy::automatic)
       .def_ro("gravity_measured", &LocalizationEstimate::gravity_measured,
               "The z axis of the world was aligned with measured gravity.")
       .def_prop_ro(
           "up_in_world", [](const LocalizationEstimate& e) { return matrix_array(e.up_in_world); },
-          "Current estimate of the vertical, unit vector.")
+          "Current estimate of the vertical, unit vector.", nb::rv_policy::automatic)
       .def_prop_ro(
           "wheel_slip",
           [](const LocalizationEstimate& e) { return e.slip ? std::optional(e.slip->slip) : std::nullopt; },

@@ -31,7 +31,8 @@ void bind_odometry(nb::module_& m) {
       .def_ro("previous_from_current", &MotionEstimate::previous_from_current)
       .def_prop_ro(
           "covariance", [](const MotionEstimate& e) { return matrix_array(e.covariance); },
-          "Shape (6, 6), order (translation, rotation), of the right perturbation; m and rad.")
+          "Shape (6, 6), order (translation, rotation), of the right perturbation; m and rad.",
+          nb::rv_policy::automatic)
       .def_prop_ro(
           "status", [](const MotionEstimate& e) { return std::string(name_of(e.status)); },
           "`tracking`, `degraded`, `lost` (the motion is predicted) or `stationary`.")

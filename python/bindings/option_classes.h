@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "bindings/errors.h"
+#include "bindings/path_text.h"
 #include "spartan/core/options.h"
 
 namespace spartan::python {
@@ -172,7 +173,7 @@ template <class Options>
 void bind_option_class(nb::module_& m) {
   const std::string name = unqualified_name(typeid(Options));
   if (nb::hasattr(m, name.c_str())) return;
-  nb::class_<Options> bound(m, name.c_str());
+  nb::class_<Options> bound(m, name.c_str(), "Options of a run; each property has its meaning, default and bounds.");
   Options prototype;
   PropertyBinder<Options> binder(m, bound, prototype);
   prototype.describe(binder);
@@ -187,7 +188,7 @@ void bind_option_class(nb::module_& m) {
       nb::sig("def __init__(self, **values: object) -> None"), "The defaults, but for the given values.");
   bound.def(
       "__eq__", [](const Options& a, const Options& b) { return dump_options(a) == dump_options(b); },
-      nb::is_operator());
+      nb::is_operator(), nb::sig("def __eq__(self, other: object, /) -> bool"));
   bound.def("__copy__", [](const Options& o) { return Options(o); });
   bound.def(
       "__deepcopy__", [](const Options& o, const nb::handle&) { return Options(o); }, nb::arg("memo"));
@@ -209,7 +210,7 @@ void bind_option_class(nb::module_& m) {
       "from_yaml", [](const std::string& text) { return value_of(parse_options<Options>(text, "options")); },
       nb::arg("text"), "The options that a YAML text gives; all others have their defaults.");
   bound.def_static(
-      "load", [](const std::string& path) { return value_of(load_options<Options>(path)); }, nb::arg("path"),
+      "load", [](const PathText& path) { return value_of(load_options<Options>(path)); }, nb::arg("path"),
       "The options of a YAML file.");
   bound.def(
       "set", [](Options& o, const std::string& assignment) { o = value_of(set_option(o, assignment)); },

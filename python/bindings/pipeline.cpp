@@ -4,16 +4,21 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/unique_ptr.h>
+#include <nanobind/stl/vector.h>
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
 #include "bindings/guarded.h"
 #include "bindings/map_layers.h"
+#include "bindings/path_text.h"
 #include "bindings/threads.h"
 
 namespace nb = nanobind;
@@ -98,7 +103,7 @@ void bind_pipeline(nb::module_& m) {
       .def(
           "__init__",
           [](PipelineValue* self, const Rig& rig, const RunOptions* options, std::optional<int> threads, bool live,
-             const std::string& masks) {
+             const PathText& masks) {
             const RunOptions chosen = options == nullptr ? RunOptions() : *options;
             const ThreadPool workers = thread_pool(threads);
             const nb::gil_scoped_release free;
@@ -122,6 +127,27 @@ void bind_pipeline(nb::module_& m) {
       .def("add", add_sensor<InclinometerSample>, "sample"_a)
       .def(
           "add", [](PipelineValue&, const MissingFrame&) { return nb::none(); }, "missing"_a, "Does nothing.")
+      .def(
+          "align_with_gravity",
+          [](PipelineValue& self, const std::vector<ImuSample>& samples) {
+            self.use([&](Pipeline& pipeline) {
+              pipeline.align_with_gravity(samples);
+              return true;
+            });
+          },
+          "stationary_samples"_a,
+          "Before the first frame: the vertical by samples of a rover at rest that are not added themselves.")
+      .def(
+          "align_with_ground",
+          [](PipelineValue& self, const NumberArray& up) {
+            const Eigen::Vector3d axis = vector_of<3>(up, "up_in_body");
+            if (!axis.allFinite() || axis.norm() < 1e-6) throw nb::value_error("up_in_body: has no direction");
+            self.use([&](Pipeline& pipeline) {
+              pipeline.align_with_ground(axis.normalized());
+              return true;
+            });
+          },
+          "up_in_body"_a, "Before the first frame: the vertical where no sensor measures it.")
       .def(
           "estimate", [](PipelineValue& self) { return self.use([](Pipeline& p) { return p.estimate(); }); },
           "LocalizationEstimate at the newest sample; None before the first frame.")

@@ -10,6 +10,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
+#include "bindings/path_text.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -48,7 +49,7 @@ PointCloudValue from_disparity(const AnyArray& disparity, const AnyArray& sigma,
   return {to_point_cloud(d, s, gray, geometry, target_from_left, Stamp{stamp}, sampling)};
 }
 
-void save(const PointCloudValue& cloud, const std::string& path) {
+void save(const PointCloudValue& cloud, const PathText& path) {
   if (path.ends_with(".ply")) return check(write_ply(path, cloud.points));
   if (path.ends_with(".pcd")) return check(write_pcd(path, cloud.points));
   throw nb::value_error("path: must end with .ply or .pcd");
@@ -64,7 +65,7 @@ void bind_point_clouds(nb::module_& m) {
           "Triangulates the pixels of a disparity image (float32, px) with their sigma; colours are gray levels of the "
           "rectified left image. `target_from_left` moves the points. `max_range_m`: 0 is no limit.")
       .def_static(
-          "load", [](const std::string& path) { return PointCloudValue{value_of(read_ply(path))}; }, "path"_a,
+          "load", [](const PathText& path) { return PointCloudValue{value_of(read_ply(path))}; }, "path"_a,
           "Reads a PLY file that Spartan wrote.")
       .def("save", save, "path"_a, "Writes a binary PLY or PCD file, by the extension.")
       .def_prop_ro(

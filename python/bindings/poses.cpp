@@ -75,13 +75,14 @@ void bind_pose(nb::module_& m) {
       .def(
           "matrix", [](const Pose& p) { return matrix_array(p.matrix()); }, "The homogeneous matrix, shape (4, 4).")
       .def_prop_ro(
-          "translation", [](const Pose& p) { return matrix_array(p.translation()); }, "Metres, shape (3,).")
+          "translation", [](const Pose& p) { return matrix_array(p.translation()); }, "Metres, shape (3,).",
+          nb::rv_policy::automatic)
       .def_prop_ro(
           "rotation", [](const Pose& p) { return matrix_array(p.rotation_matrix()); },
-          "The rotation matrix, shape (3, 3).")
+          "The rotation matrix, shape (3, 3).", nb::rv_policy::automatic)
       .def_prop_ro(
           "quaternion_xyzw", [](const Pose& p) { return matrix_array(Eigen::Vector4d(p.rotation().coeffs())); },
-          "The unit quaternion (x, y, z, w).")
+          "The unit quaternion (x, y, z, w).", nb::rv_policy::automatic)
       .def_prop_ro(
           "angle_rad", [](const Pose& p) { return rotation_angle(p); }, "The angle of the rotation, 0 to pi.")
       .def(
@@ -111,10 +112,12 @@ void bind_poses(nb::module_& m) {
       .def_ro("pose", &UncertainPose::pose)
       .def_prop_ro(
           "covariance", [](const UncertainPose& p) { return matrix_array(p.covariance); },
-          "Shape (6, 6), order (translation, rotation), of the right perturbation pose @ Pose.exp(error); m and rad.")
+          "Shape (6, 6), order (translation, rotation), of the right perturbation pose @ Pose.exp(error); m and rad.",
+          nb::rv_policy::automatic)
       .def_prop_ro(
           "sigma", [](const UncertainPose& p) { return matrix_array(Vector6d(p.covariance.diagonal().cwiseSqrt())); },
-          "Standard deviations of translation (m) and rotation (rad) along the axes of the body, shape (6,).")
+          "Standard deviations of translation (m) and rotation (rad) along the axes of the body, shape (6,).",
+          nb::rv_policy::automatic)
       .def("inverse", [](const UncertainPose& p) { return invert(p); })
       .def(
           "__matmul__", [](const UncertainPose& a, const UncertainPose& b) { return compose(a, b); }, nb::is_operator(),

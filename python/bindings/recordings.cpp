@@ -14,16 +14,17 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
+#include "bindings/path_text.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
 
 namespace spartan::python {
 
-OpenOptions open_options(const std::optional<std::string>& rig, const std::optional<std::string>& format,
+OpenOptions open_options(const std::optional<PathText>& rig, const std::optional<std::string>& format,
                          const std::optional<std::string>& left, const std::optional<std::string>& right, double fps) {
   OpenOptions open;
-  open.rig_file = rig.value_or("");
+  if (rig) open.rig_file = *rig;
   if (format) open.format = value_of(parse_recording_format(*format));
   open.left_images = left.value_or("");
   open.right_images = right.value_or("");
@@ -108,7 +109,7 @@ void bind_recordings(nb::module_& m) {
       });
   m.def(
       "open_recording",
-      [](const std::string& path, const std::optional<std::string>& rig, const std::optional<std::string>& format,
+      [](const PathText& path, const std::optional<PathText>& rig, const std::optional<std::string>& format,
          const std::optional<std::string>& left, const std::optional<std::string>& right, double fps) {
         const OpenOptions options = open_options(rig, format, left, right, fps);
         const nb::gil_scoped_release free;

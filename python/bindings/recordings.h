@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "bindings/guarded.h"
+#include "bindings/path_text.h"
 #include "spartan/camera/recording.h"
 
 namespace spartan::python {
@@ -22,7 +23,7 @@ struct RecordingValue {
 };
 
 /// The format of its name; none for None. Raises ValueError.
-OpenOptions open_options(const std::optional<std::string>& rig, const std::optional<std::string>& format,
+OpenOptions open_options(const std::optional<PathText>& rig, const std::optional<std::string>& format,
                          const std::optional<std::string>& left, const std::optional<std::string>& right, double fps);
 
 /// The sample as StereoFrame, ImuSample … or MissingFrame.

@@ -124,7 +124,8 @@ void bind_rigs(nb::module_& m) {
       .def(
           "describe", [](const Rig& r) { return describe_rig(r); }, "Lines of text about every camera and pair.")
       .def(
-          "__eq__", [](const Rig& a, const Rig& b) { return a == b; }, nb::is_operator())
+          "__eq__", [](const Rig& a, const Rig& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("__getstate__", [](const Rig& r) { return to_rig_yaml(r); })
       .def("__setstate__",
            [](Rig* self, const std::string& yaml) { new (self) Rig(value_of(parse_rig_yaml(yaml, "pickled rig"))); })

@@ -12,6 +12,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
+#include "bindings/path_text.h"
 #include "bindings/threads.h"
 #include "bindings/trajectory.h"
 #include "spartan/system/run_folder.h"
@@ -32,7 +33,7 @@ struct RunResults {
   std::vector<TerrainRecord> terrain;
 };
 
-RunResults open_results(const std::string& path) {
+RunResults open_results(const PathText& path) {
   const nb::gil_scoped_release free;
   RunResults results{{path}, {}, {}, {}};
   RunStore store = value_of(RunStore::open_read_only(results.folder.store()));
@@ -76,7 +77,7 @@ nb::ndarray<nb::numpy, double, nb::shape<-1, 6, 6>> covariances(const RunResults
   return {values->data(), {values->size() / 36, 6, 6}, owner};
 }
 
-void export_to(const RunResults& run, const std::string& format, const std::string& path,
+void export_to(const RunResults& run, const std::string& format, const PathText& path,
                const std::optional<std::string>& trajectory, std::optional<int> threads) {
   const ExportFormat chosen = value_of(parse_export_format(format));
   const std::optional<TrajectoryKind> kind = trajectory ? std::optional(kind_of(run, trajectory)) : std::nullopt;
@@ -144,7 +145,7 @@ void bind_run_results(nb::module_& m) {
   bind_records(m);
   nb::class_<RunResults>(m, "RunResults", "The records of a run folder; see spartan.Run.")
       .def(
-          "__init__", [](RunResults* self, const std::string& path) { new (self) RunResults(open_results(path)); },
+          "__init__", [](RunResults* self, const PathText& path) { new (self) RunResults(open_results(path)); },
           "path"_a)
       .def_prop_ro("path", [](const RunResults& r) { return r.folder.path; })
       .def_prop_ro(

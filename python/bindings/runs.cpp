@@ -14,6 +14,7 @@
 
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
+#include "bindings/path_text.h"
 #include "bindings/python_hooks.h"
 #include "bindings/recordings.h"
 #include "bindings/threads.h"
@@ -75,7 +76,7 @@ std::string run_input(const RunRequest& request, const RunHooks& hooks, double s
   return value_of(std::move(outcome)).summary_json;
 }
 
-std::string run_folder(const std::string& input, const std::string& output, const RunOptions* options,
+std::string run_folder(const PathText& input, const PathText& output, const RunOptions* options,
                        const OpenOptions& open, RunRequest request, double speed, const nb::object& progress,
                        const nb::object& frame) {
   request.input = input;
@@ -101,8 +102,8 @@ std::string run_folder(const std::string& input, const std::string& output, cons
   return run_input(request, hooks, speed, python);
 }
 
-void report(const std::string& run, const std::string& recording, const std::optional<std::string>& truth,
-            const std::string& page, std::optional<int> threads) {
+void report(const PathText& run, const PathText& recording, const PathText& page, const std::optional<PathText>& truth,
+            std::optional<int> threads) {
   const int count = thread_count(threads);
   const nb::gil_scoped_release free;
   ReportRequest about;
@@ -110,7 +111,7 @@ void report(const std::string& run, const std::string& recording, const std::opt
   about.recording = recording;
   const RunFolder folder{run};
   about.options = value_of(load_options<RunOptions>(folder.config()));
-  about.truth = truth.value_or("");
+  if (truth) about.truth = *truth;
   about.threads = count;
   about.page = page;
   const std::string html = value_of(make_report(about));
@@ -130,11 +131,10 @@ void bind_runs(nb::module_& m) {
       });
   m.def(
       "run_into_folder",
-      [](const std::string& input, const std::string& output, const RunOptions* options,
-         const std::optional<std::string>& rig, const std::optional<std::string>& format,
-         const std::optional<std::string>& left, const std::optional<std::string>& right, double fps,
-         std::optional<int> threads, int max_frames, bool resume, bool replace, double speed,
-         const nb::object& progress, const nb::object& frame) {
+      [](const PathText& input, const PathText& output, const RunOptions* options, const std::optional<PathText>& rig,
+         const std::optional<std::string>& format, const std::optional<std::string>& left,
+         const std::optional<std::string>& right, double fps, std::optional<int> threads, int max_frames, bool resume,
+         bool replace, double speed, const nb::object& progress, const nb::object& frame) {
         if (max_frames < 0) throw nb::value_error("max_frames: must not be negative");
         RunRequest request;
         request.threads = thread_count(threads);
@@ -149,7 +149,7 @@ void bind_runs(nb::module_& m) {
       "format"_a = nb::none(), "left"_a = nb::none(), "right"_a = nb::none(), "fps"_a = 0.0, "threads"_a = nb::none(),
       "max_frames"_a = 0, "resume"_a = false, "replace"_a = false, "speed"_a = 1.0, "progress"_a = nb::none(),
       "frame"_a = nb::none(), "See spartan.run(). Returns the text of summary.json.");
-  m.def("write_report", report, "run"_a, "recording"_a, "truth"_a = nb::none(), "page"_a, "threads"_a = nb::none(),
+  m.def("write_report", report, "run"_a, "recording"_a, "page"_a, "truth"_a = nb::none(), "threads"_a = nb::none(),
         "Writes the report page of a run folder.");
 }
 

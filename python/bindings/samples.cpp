@@ -104,10 +104,11 @@ void bind_sensors(nb::module_& m) {
           "stamp_ns"_a, "gyro_rad_s"_a, "accel_m_s2"_a)
       .def_prop_ro("stamp_ns", [](const ImuSample& s) { return s.stamp.ns; })
       .def_prop_ro(
-          "gyro_rad_s", [](const ImuSample& s) { return matrix_array(s.gyro_rad_s); }, "rad/s, shape (3,).")
+          "gyro_rad_s", [](const ImuSample& s) { return matrix_array(s.gyro_rad_s); }, "rad/s, shape (3,).",
+          nb::rv_policy::automatic)
       .def_prop_ro(
           "accel_m_s2", [](const ImuSample& s) { return matrix_array(s.accel_m_s2); },
-          "Specific force, m/s², shape (3,); points up at rest.");
+          "Specific force, m/s², shape (3,); points up at rest.", nb::rv_policy::automatic);
   nb::class_<WheelSample>(m, "WheelSample", "Rolled distance of the left and right wheels since the start.")
       .def(
           "__init__",

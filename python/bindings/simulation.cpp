@@ -10,6 +10,7 @@
 
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
+#include "bindings/path_text.h"
 #include "bindings/python_hooks.h"
 #include "bindings/threads.h"
 #ifdef SPARTAN_HAS_SIM
@@ -23,7 +24,7 @@ namespace spartan::python {
 namespace {
 
 #ifdef SPARTAN_HAS_SIM
-std::int64_t simulate(const std::string& scenario, const std::string& output, const std::vector<std::string>& set,
+std::int64_t simulate(const PathText& scenario, const PathText& output, const std::vector<std::string>& set,
                       std::optional<int> seed, bool resume, std::optional<int> threads, const nb::object& progress) {
   const ThreadPool workers = thread_pool(threads);
   PythonHooks python;

@@ -11,6 +11,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
+#include "bindings/path_text.h"
 #include "bindings/trajectory.h"
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
@@ -69,7 +70,7 @@ const StampedPose& at(const TrajectoryValue& t, std::int64_t index) {
   return t.poses[static_cast<std::size_t>(index)];
 }
 
-void save(const TrajectoryValue& t, const std::string& path, const std::string& format) {
+void save(const TrajectoryValue& t, const PathText& path, const std::string& format) {
   const auto text = format == "tum"     ? std::optional(to_tum(t.poses))
                     : format == "kitti" ? std::optional(to_kitti(t.poses))
                     : format == "euroc" ? std::optional(to_euroc(t.poses))
@@ -96,13 +97,12 @@ void bind_trajectories(nb::module_& m) {
           "stamps_ns"_a, "positions"_a, "quaternions_xyzw"_a,
           "Stamps in nanoseconds, int64, shape (n,); positions in metres, shape (n, 3); quaternions, shape (n, 4).")
       .def_static(
-          "load", [](const std::string& path) { return TrajectoryValue{value_of(load_trajectory(path)).poses}; },
-          "path"_a,
+          "load", [](const PathText& path) { return TrajectoryValue{value_of(load_trajectory(path)).poses}; }, "path"_a,
           "Reads a trajectory in the format of TUM, KITTI (with `times.txt` beside it) or EuRoC, told by the content.")
       .def("save", save, "path"_a, "format"_a = "tum", "Writes it in the format `tum`, `kitti` or `euroc`.")
-      .def_prop_ro("stamps_ns", stamps_ns, "Nanoseconds, int64, shape (n,).")
-      .def_prop_ro("positions", positions, "Metres, shape (n, 3).")
-      .def_prop_ro("quaternions_xyzw", quaternions, "Unit quaternions, shape (n, 4).")
+      .def_prop_ro("stamps_ns", stamps_ns, "Nanoseconds, int64, shape (n,).", nb::rv_policy::automatic)
+      .def_prop_ro("positions", positions, "Metres, shape (n, 3).", nb::rv_policy::automatic)
+      .def_prop_ro("quaternions_xyzw", quaternions, "Unit quaternions, shape (n, 4).", nb::rv_policy::automatic)
       .def_prop_ro(
           "length_m", [](const TrajectoryValue& t) { return path_length(t.poses); },
           "Length of the line through the positions, m.")

@@ -10,7 +10,10 @@ Units are SI and radians, stamps are integer nanoseconds, images and maps are ar
 docs/conventions.md.
 """
 
+from spartan import _core
 from spartan._core import *  # noqa: F403
-from spartan._core import __version__
-from spartan._errors import Error
-from spartan._run import Run, run
+from spartan._errors import Error as Error
+from spartan._run import Run as Run
+from spartan._run import run as run
+
+__version__: str = getattr(_core, "__version__")

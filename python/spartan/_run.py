@@ -21,7 +21,7 @@ class Run:
 
     def __init__(self, path: StrPath) -> None:
         """Opens a run folder. Raises Error where it is not one."""
-        self._results = _core.RunResults(os.fspath(path))
+        self._results = _core.RunResults(path)
 
     @property
     def path(self) -> Path:
@@ -79,7 +79,7 @@ class Run:
     def export(self, format: str, path: StrPath, *, trajectory: str | None = None, threads: int | None = None) -> None:
         """Writes the run as `tum`, `kitti`, `euroc`, `csv` (trajectory), `geotiff`, `octomap` (map), `ply` or `pcd`
         (terrain)."""
-        self._results.export(format, os.fspath(path), trajectory, threads)
+        self._results.export(format, path, trajectory, threads)
 
     def __repr__(self) -> str:
         return f"<Run '{self._results.path}': {len(self.frames)} frames>"
@@ -121,10 +121,10 @@ def run(
     Raises Error, e.g. with the code `input` (no usable recording), `configuration` or `output`.
     """
     _core.run_into_folder(
-        os.fspath(input),
-        os.fspath(output),
+        input,
+        output,
         options,
-        rig=None if rig is None else os.fspath(rig),
+        rig=rig,
         format=format,
         left=left,
         right=right,
@@ -141,7 +141,5 @@ def run(
     if report:
         page = finished.path / "report" / "index.html"
         page.parent.mkdir(exist_ok=True)
-        _core.write_report(
-            os.fspath(output), os.fspath(input), None if truth is None else os.fspath(truth), str(page), threads
-        )
+        _core.write_report(output, input, page, truth, threads)
     return finished
