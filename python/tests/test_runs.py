@@ -268,6 +268,7 @@ def test_a_simulation_is_a_recording(tmp_path):
     assert raised.value.code == "usage"
 
 
+@pytest.mark.skipif("asan" in os.environ.get("LD_PRELOAD", ""), reason="the address sanitizer keeps freed memory")
 def test_memory_is_flat_over_a_thousand_calls(drive):
     import resource
 
