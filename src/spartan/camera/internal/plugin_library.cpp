@@ -14,11 +14,14 @@ void* open_plugin(const char* file, const char* variable) {
   constexpr int kMode = RTLD_NOW | RTLD_LOCAL;
   if (const char* given = std::getenv(variable)) return ::dlopen(given, kMode);
   std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  void* library = nullptr;
-  for (const fs::path& folder : {program.parent_path(), program.parent_path().parent_path() / "lib" / "spartan"}) {
+  const fs::path program = fs::read_symlink("/proc/self/exe", error).parent_path();
+  // The file that contains this code: the program, or the module of another one (the Python package).
+  ::Dl_info module{};
+  ::dladdr(reinterpret_cast<const void*>(&open_plugin), &module);
+  const fs::path beside = fs::path(module.dli_fname == nullptr ? "" : module.dli_fname).parent_path();
+  for (const fs::path& folder : {program, program.parent_path() / "lib" / "spartan", beside / "bin"}) {
     // Where the file is there, its own error is the one to tell.
-    if (library == nullptr && fs::exists(folder / file, error)) return ::dlopen((folder / file).c_str(), kMode);
+    if (fs::exists(folder / file, error)) return ::dlopen((folder / file).c_str(), kMode);
   }
   return ::dlopen(file, kMode);
 }
