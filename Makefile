@@ -25,7 +25,7 @@ demo:
 
 test:
 	./setup build test
-	scripts/build release
+	scripts/build release -DSPARTAN_PYTHON=ON
 	ctest --preset release -j $$(nproc)
 
 faults:
