@@ -302,3 +302,11 @@ def test_memory_is_flat_over_a_thousand_calls(drive):
         call(i)
     assert resident_kb() - before < 4000  # kB; one image of each call would be 75 000
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 2_000_000
+
+
+def test_a_folder_with_the_name_of_a_scenario_is_not_meant(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "quick").mkdir()
+    with pytest.raises(spartan.Error) as raised:
+        spartan.simulate("quick", "drive", set=["samples=3"])
+    assert raised.value.code == "configuration" and "samples" in str(raised.value)

@@ -30,7 +30,8 @@ std::string shipped_scenario_names() {
 
 Result<Text> find_scenario(const std::string& wanted) {
   std::error_code error;
-  if (!fs::exists(wanted, error)) {
+  // A folder of that name, e.g. of an earlier recording, is not meant.
+  if (!fs::exists(wanted, error) || fs::is_directory(wanted, error)) {
     if (const auto shipped = shipped_file("scenarios/" + wanted + ".yaml"))
       return Text{std::string(*shipped), wanted, false};
     return failure(ErrorCode::input, "is neither a file nor a shipped scenario", wanted,
