@@ -14,6 +14,7 @@ void bind_rigs(nanobind::module_& m);
 void bind_calibrations(nanobind::module_& m);
 void bind_samples(nanobind::module_& m);
 void bind_recordings(nanobind::module_& m);
+void bind_recording_writer(nanobind::module_& m);
 void bind_imaging(nanobind::module_& m);
 void bind_stereo(nanobind::module_& m);
 void bind_point_clouds(nanobind::module_& m);

@@ -15,6 +15,7 @@ NB_MODULE(_core, m) {
   bind_rigs(m);
   bind_calibrations(m);
   bind_samples(m);
+  bind_recording_writer(m);
   bind_recordings(m);
   bind_imaging(m);
   bind_stereo(m);

@@ -80,6 +80,12 @@ void bind_recordings(nb::module_& m) {
       .def_prop_ro(
           "remarks", [](const RecordingValue& r) { return remarks(r.info->sequence); },
           "What is irregular or was assumed.")
+      .def_prop_ro("description", [](const RecordingValue& r) { return r.info->description; })
+      .def_prop_ro(
+          "gravity_m_s2", [](const RecordingValue& r) { return r.info->gravity_m_s2; },
+          "As the recording states it; None where it does not.")
+      .def_prop_ro(
+          "noise", [](const RecordingValue& r) { return r.info->noise; }, "Specified noise of the sensors.")
       .def(
           "stamps_ns",
           [](RecordingValue& r, const std::string& pair) {

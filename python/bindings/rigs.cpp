@@ -75,6 +75,22 @@ Rig stereo_rig(const Camera& left, const Camera& right, const Pose& right_from_l
   return rig;
 }
 
+// The first pair on the body, and the IMU.
+Rig mounted(const Rig& rig, const Pose& body_from_left, const std::optional<Pose>& body_from_imu) {
+  Rig moved = rig;
+  const StereoPair pair = rig.pairs.front();
+  const Pose left_from_right = rig.right_from_left(pair).inverse();
+  for (Camera& camera : moved.cameras) {
+    if (camera.name != pair.left && camera.name != pair.right) continue;
+    camera.mount = "body";
+    camera.mount_from_camera = camera.name == pair.left ? body_from_left : body_from_left * left_from_right;
+  }
+  if (body_from_imu) moved.imu.body_from_imu = *body_from_imu;
+  moved.convention = PoseConvention::body;
+  check(moved.validate(rig.name));
+  return moved;
+}
+
 }  // namespace
 
 void bind_rigs(nb::module_& m) {
@@ -93,6 +109,9 @@ void bind_rigs(nb::module_& m) {
       .def(
           "to_yaml", [](const Rig& r) { return to_rig_yaml(r); },
           "The rig as rig.yaml; from_yaml() restores it bit for bit.")
+      .def("mounted", mounted, "body_from_left"_a, "body_from_imu"_a = nb::none(),
+           "The same rig with another pose of its first pair on the body, and of the IMU, whose readings have its axes.")
+      .def_prop_ro("track_m", [](const Rig& r) { return r.rover.track_m; }, "Distance between left and right wheels, m.")
       .def_ro("name", &Rig::name)
       .def_prop_ro("cameras", [](const Rig& r) { return r.cameras; })
       .def_prop_ro("pairs", [](const Rig& r) { return r.pairs; })

@@ -1,0 +1,12 @@
+"""Bags of ROS 1 and ROS 2, without ROS: `pip install spartan[bags]`.
+
+    from spartan import bags
+
+    bags.import_bag("drive.bag", "recording")     # then spartan.run("recording", "run")
+    bags.export_recording("kitti_06", "kitti_06.bag")
+"""
+
+from spartan.bags._export_recording import export_recording as export_recording
+from spartan.bags._import import import_bag as import_bag
+from spartan.bags._messages import world_covariance as world_covariance
+from spartan.bags._writer import BagWriter as BagWriter
