@@ -7,6 +7,7 @@
 """
 
 from spartan.bags._export_recording import export_recording as export_recording
+from spartan.bags._export_run import export_run as export_run
 from spartan.bags._import import import_bag as import_bag
 from spartan.bags._messages import world_covariance as world_covariance
 from spartan.bags._writer import BagWriter as BagWriter

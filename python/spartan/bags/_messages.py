@@ -37,7 +37,7 @@ class Messages:
         header = "" if ros1 else "std_msgs/Header header\n"
         self.store.register(get_types_from_msg(_GRID_MAP.format(header=header), "grid_map_msgs/msg/GridMap"))
 
-    def make(self, name: str, **fields: Any) -> Any:
+    def make(self, name: str, /, **fields: Any) -> Any:
         """A message of the type "package/Name"."""
         return self.store.types[name.replace("/", "/msg/")](**fields)
 
