@@ -109,9 +109,11 @@ void bind_rigs(nb::module_& m) {
       .def(
           "to_yaml", [](const Rig& r) { return to_rig_yaml(r); },
           "The rig as rig.yaml; from_yaml() restores it bit for bit.")
-      .def("mounted", mounted, "body_from_left"_a, "body_from_imu"_a = nb::none(),
-           "The same rig with another pose of its first pair on the body, and of the IMU, whose readings have its axes.")
-      .def_prop_ro("track_m", [](const Rig& r) { return r.rover.track_m; }, "Distance between left and right wheels, m.")
+      .def(
+          "mounted", mounted, "body_from_left"_a, "body_from_imu"_a = nb::none(),
+          "The same rig with another pose of its first pair on the body, and of the IMU, whose readings have its axes.")
+      .def_prop_ro(
+          "track_m", [](const Rig& r) { return r.rover.track_m; }, "Distance between left and right wheels, m.")
       .def_ro("name", &Rig::name)
       .def_prop_ro("cameras", [](const Rig& r) { return r.cameras; })
       .def_prop_ro("pairs", [](const Rig& r) { return r.pairs; })

@@ -132,7 +132,7 @@ TEST(InputErrors, NameWhatIsThereAndWhatToDo) {
   EXPECT_THAT(error_of("drive.bag"), HasSubstr("ROS 1 bag"));
   fs::create_directories(folder.path() + "/bag2");
   folder.write("bag2/metadata.yaml", "rosbag2_bagfile_information:\n");
-  EXPECT_THAT(error_of("bag2"), HasSubstr("bag_to_images.py"));
+  EXPECT_THAT(error_of("bag2"), HasSubstr("spartan-bag import"));
   for (const char* name : {"one/left/a.png", "one/right/a.png"}) {
     fs::create_directories(fs::path(folder.path() + "/" + name).parent_path());
     cv::imwrite(folder.path() + "/" + name, cv::Mat(12, 16, CV_8U, cv::Scalar(90)));

@@ -35,7 +35,7 @@ def _odometry(messages: Messages, record: _core.FrameRecord) -> Any:
 def _point_cloud(messages: Messages, stamp_ns: int, cloud: _core.PointCloud, base_from_map: _core.Pose) -> Any:
     """In `base_link` at the time of the image; rgb as PCL packs it."""
     points = np.zeros(len(cloud), [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<u4"), ("sigma_m", "<f4")])
-    moved = base_from_map @ cloud.positions
+    moved = np.asarray(base_from_map @ cloud.positions)
     for i, axis in enumerate("xyz"):
         points[axis] = moved[:, i]
     colours = cloud.colours.astype(np.uint32)
@@ -51,14 +51,15 @@ def _point_cloud(messages: Messages, stamp_ns: int, cloud: _core.PointCloud, bas
 def _disparity(messages: Messages, stamp_ns: int, pair: str, values: npt.NDArray[np.float32],
                geometry: _core.RectifiedStereo) -> Any:
     """Unknown pixels are below min_disparity, as stereo_image_proc writes them."""
-    known = np.where(np.isfinite(values), values, np.float32(-1))
+    least = float(np.nanmin(values, initial=0.0))  # of distant points, a little below 0
+    known = np.where(np.isfinite(values), values, np.float32(least - 1))
     frame = f"{pair}_left_rectified_frame"
     window = messages.make("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=values.shape[0],
                            width=values.shape[1], do_rectify=False)
     baseline = {"T" if messages.ros1 else "t": geometry.baseline_m}
     return messages.make("stereo_msgs/DisparityImage", header=messages.header(stamp_ns, frame),
                          image=messages.image(stamp_ns, frame, known, "32FC1"), f=geometry.focal_px,
-                         valid_window=window, min_disparity=0.0, max_disparity=float(max(known.max(initial=0), 0)),
+                         valid_window=window, min_disparity=least, max_disparity=float(known.max(initial=0.0)),
                          delta_d=1 / 16, **baseline)
 
 

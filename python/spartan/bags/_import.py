@@ -76,7 +76,7 @@ def _pixels(message: Any, topic: str) -> tuple[npt.NDArray[Any], str]:
     if hasattr(message, "format"):
         import PIL.Image
 
-        decoded = PIL.Image.open(io.BytesIO(bytes(message.data)))
+        decoded: PIL.Image.Image = PIL.Image.open(io.BytesIO(bytes(message.data)))
         if decoded.mode not in ("L", "I;16"):
             decoded = decoded.convert("RGB")
         pixels = np.array(decoded)
@@ -309,6 +309,8 @@ class _Importer:
 
     def frame(self, pair: PairTopics, waiting: _Waiting) -> _core.StereoFrame:
         (stamp, left, layout), (right_stamp, right, _) = waiting.left.popleft(), waiting.right.popleft()
+        if left.ndim != right.ndim or left.dtype != right.dtype:
+            raise Error("input", "the left and the right images have different formats", pair.left)
         details = waiting.details.pop(stamp, {})
         camera = self.rig.camera(self.rig.pair(pair.name).left)
         frame_id = int(details.get("frame_id", waiting.frames))

@@ -99,8 +99,7 @@ std::optional<Error> known_but_not_read(const fs::path& path) {
                     (metadata && metadata->find("rosbag2") != std::string::npos);
   if (!ros1 && !ros2) return std::nullopt;
   return Error{ErrorCode::input, ros1 ? "is a ROS 1 bag, which is not read" : "is a ROS 2 bag, which is not read",
-               path.string(),
-               "extract its images first: scripts/bag_to_images.py BAG FOLDER --left TOPIC --right TOPIC"};
+               path.string(), "make a recording of it: spartan-bag import BAG -o RECORDING, of the Python package"};
 }
 
 const FormatEntry& entry_of(RecordingFormat format) {

@@ -232,7 +232,7 @@ TEST_F(SpartanRecordingFaults, TablesOfOtherProgramsAreRecognised) {
     EXPECT_THAT(error_message(), HasSubstr("give the folder that holds mav0")) << table;
   }
   folder_.write("rec/frames.csv", "%time,field.header.seq,field.header.stamp\n1,2,3\n");
-  EXPECT_THAT(error_message(), HasSubstr("bag_to_images.py"));
+  EXPECT_THAT(error_message(), HasSubstr("spartan-bag import"));
   folder_.write("rec/frames.csv", "number,pair\n1,front\n");
   EXPECT_THAT(error_message(), Not(HasSubstr("mav0")));
 }

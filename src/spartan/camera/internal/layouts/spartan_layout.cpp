@@ -50,7 +50,7 @@ Status read_properties(const fs::path& folder, bool is_complete_table, Recording
 std::string hint_of_other_table(const fs::path& path) {
   const auto text = read_beginning(path.string(), 256);
   if (!text) return {};
-  if (text->starts_with("%time")) return "a ROS topic as text; scripts/bag_to_images.py converts the bag itself";
+  if (text->starts_with("%time")) return "a ROS topic as text; spartan-bag import reads the bag itself";
   const std::size_t digits = std::min(text->find_first_not_of("0123456789"), text->size());
   if (text->starts_with("#timestamp") || (digits >= kLeastDigits_ns && text->substr(digits, 1) == ",")) {
     return "the table of one camera as in mav0/cam0/data.csv of EuRoC: give the folder that holds mav0, or the folders "
