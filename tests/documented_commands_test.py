@@ -53,7 +53,8 @@ def lines_of_help(program):
 
 def check_named_options(program, source):
     own = subprocess.run([program, "--help"], check=True, capture_output=True, text=True, timeout=60).stdout
-    known = {option for text in [own, *(text for _, text in helps(program))] for option in re.findall(r"--[a-z][a-z-]+", text)}
+    bags = (source / "python/spartan/bags/_command.py").read_text(encoding="utf-8")  # spartan-bag
+    known = {option for text in [own, bags, *(text for _, text in helps(program))] for option in re.findall(r"--[a-z][a-z-]+", text)}
     texts = [source / "docs/limits.md", *(source / "docs/tutorials").glob("*.md"), *(source / "docs/reference").glob("*.md")]
     for text in texts:
         for number, line in enumerate(text.read_text(encoding="utf-8").splitlines(), 1):

@@ -71,6 +71,7 @@ PairInspection inspect(const Rig& rig, const std::vector<ImagePair>& frames, con
   const StereoPair* const pair = name ? rig.find_pair(*name) : rig.pairs.empty() ? nullptr : &rig.pairs.front();
   if (pair == nullptr) throw nb::key_error(name.value_or("the rig has no pair").c_str());
   std::vector<StereoViews> views;
+  views.reserve(frames.size());
   for (const auto& [left, right] : frames)
     views.push_back({image_view<std::uint8_t>(left, "left"), image_view<std::uint8_t>(right, "right")});
   const ThreadPool workers = thread_pool(threads);
@@ -130,6 +131,7 @@ void bind_calibrations(nb::module_& m) {
           "ignored",
           [](const LoadedRig& r) {
             std::vector<std::string> lines;
+            lines.reserve(r.ignored.size());
             for (const RigDifference& each : r.ignored) lines.push_back(each.key + ": " + each.text);
             return lines;
           },

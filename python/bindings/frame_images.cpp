@@ -1,6 +1,7 @@
 #include "bindings/frame_images.h"
 
 #include <memory>
+#include <type_traits>
 #include <utility>
 
 #include "bindings/pixel_format.h"
@@ -27,7 +28,7 @@ FrameImage share(const AnyArray& array, const PixelFormat& format, const char* n
 template <class Pixel, class Channel>
 nb::object array_of_pixels(const FrameImage& image) {
   const ImageView<const Pixel> view = image.as<Pixel>();
-  constexpr std::size_t channels = sizeof(Pixel) / sizeof(Channel);
+  constexpr std::size_t channels = std::is_same_v<Pixel, Channel> ? 1 : 3;
   const nb::capsule owner(new FrameImage(image), [](void* p) noexcept { delete static_cast<FrameImage*>(p); });
   const std::array<std::size_t, 3> shape{static_cast<std::size_t>(view.height()),
                                          static_cast<std::size_t>(view.width()), channels};

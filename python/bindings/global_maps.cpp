@@ -35,9 +35,10 @@ MapView view_of(SavedMap& saved, const std::optional<Window>& wanted) {
   const auto& [west, east, south, north] = *wanted;
   constexpr double kMost_m = 1e6;  // of a coordinate: the columns are counted by int
   for (const double each : {west, east, south, north}) {
-    if (!(std::abs(each) < kMost_m))
+    if (!(std::abs(each) < kMost_m)) {
       throw RaisedError(
           Error{ErrorCode::usage, "is not a rectangle of the world", "extent", "metres: west, east, south, north"});
+    }
   }
   if (west >= east || south >= north)
     throw RaisedError(Error{ErrorCode::usage, "has no area", "extent", "the order is west, east, south, north"});

@@ -64,9 +64,10 @@ void add_view(Mapper& mapper, const RectifiedPairValue& pair, double nearest_m) 
 
 LocalMapValue make_map(Mapper& mapper, const Pose& map_from_body) {
   return mapper.use([&](StopMapper& stop) {
-    if (stop.views().empty())
+    if (stop.views().empty()) {
       throw RaisedError(
           Error{ErrorCode::usage, "there is no view to make a map of", "StopMapper.map", "add one before"});
+    }
     const std::vector<SurfacePoint> points = surface_points(stop.merge());
     LocalMap map = stop.map(points, map_from_body);
     stop.leave();

@@ -70,7 +70,7 @@ void bind_parts(nb::module_& m) {
 }
 
 Rig stereo_rig(const Camera& left, const Camera& right, const Pose& right_from_left, const std::string& name) {
-  const Rig rig = rig_of_one_pair(name, left, right, right_from_left);
+  Rig rig = rig_of_one_pair(name, left, right, right_from_left);
   check(rig.validate(name));
   return rig;
 }

@@ -155,6 +155,7 @@ void bind_run_results(nb::module_& m) {
       .def_prop_ro("terrain_stamps_ns",
                    [](const RunResults& r) {
                      std::vector<std::int64_t> stamps;
+                     stamps.reserve(r.terrain.size());
                      for (const TerrainRecord& t : r.terrain) stamps.push_back(t.stamp.ns);
                      return stamps;
                    })

@@ -19,9 +19,9 @@ def _parser() -> argparse.ArgumentParser:
     read = commands.add_parser("import", help="a bag becomes a recording for `spartan run`")
     read.add_argument("bag", help="file of ROS 1, folder of ROS 2")
     read.add_argument("-o", "--output", required=True, help="folder of the recording to create")
-    for name, what in (("left", "of the left images"), ("right", "of the right images"), ("imu", "of sensor_msgs/Imu"),
-                       ("wheels", "of nav_msgs/Odometry by the wheels")):
-        read.add_argument(f"--{name}", metavar="TOPIC", help=f"topic {what} (default: guessed by types and names)")
+    for option, what in (("--left", "of the left images"), ("--right", "of the right images"),
+                         ("--imu", "of sensor_msgs/Imu"), ("--wheels", "of nav_msgs/Odometry by the wheels")):
+        read.add_argument(option, metavar="TOPIC", help=f"topic {what} (default: guessed by types and names)")
     read.add_argument("--rig", help="calibration file in any supported format (default: camera_info and tf_static)")
     read.add_argument("--pair-tolerance", type=float, default=0.005, metavar="S",
                       help="largest difference of the stamps of the images of a frame (default 0.005)")
