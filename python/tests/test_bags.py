@@ -262,3 +262,19 @@ def test_the_command(drive, drive_run, tmp_path):
     assert "no images of a left and a right camera" in text and "/spartan/odometry" in text
     text = call("import", tmp_path / "drive.bag", "-o", tmp_path / "other", "--left", "/a", "--right", "/b", code=3)
     assert "has no topic /a, /b" in text
+
+
+def test_mcap_has_the_types_and_stamps(drive_run, tmp_path):
+    reader = pytest.importorskip("mcap.reader")
+    bags.export_run(drive_run, tmp_path / "run", storage="mcap")
+    (file,) = (tmp_path / "run").glob("*.mcap")
+    expected = {topic: kind for topic, kind, _ in read(tmp_path / "run")}
+    found, stamps = {}, []
+    with file.open("rb") as stream:
+        for schema, channel, message in reader.make_reader(stream).iter_messages():
+            assert schema.encoding == "ros2msg" and channel.message_encoding == "cdr" and schema.data
+            found[channel.topic] = schema.name
+            if channel.topic == "/spartan/pose":
+                stamps.append(message.log_time)
+    assert found == expected
+    assert stamps == list(drive_run.trajectory().stamps_ns)
