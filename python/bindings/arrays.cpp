@@ -43,8 +43,7 @@ void check_pixels(const AnyArray& array, nb::dlpack::dtype type, std::size_t cha
 }
 
 ColourArray owned_array(Image<Rgb8> image) {
-  auto* const kept = new Image<Rgb8>(std::move(image));
-  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<Image<Rgb8>*>(p); });
+  const auto [kept, owner] = kept_by_python(std::move(image));
   const std::array<std::size_t, 3> shape{static_cast<std::size_t>(kept->height()),
                                          static_cast<std::size_t>(kept->width()), 3};
   const std::array<std::int64_t, 3> strides{kept->stride() * 3, 3, 1};

@@ -103,11 +103,23 @@ ImageArray<const T> shared_array(ImageView<const T> view, nb::handle owner) {
   return ImageArray<const T>(view.data(), 2, shape.data(), owner, strides.data());
 }
 
+/// The pixels of an image in an object of Python, which the array keeps.
+template <class Owner, class T>
+nb::object member_array(const nb::handle& self, const Image<T> Owner::*member) {
+  return nb::cast(shared_array<T>((nb::inst_ptr<Owner>(self)->*member).view(), self));
+}
+
+/// A value that lives as long as the object that is returned with it.
+template <class T>
+std::pair<T*, nb::capsule> kept_by_python(T value) {
+  auto* const kept = new T(std::move(value));
+  return {kept, nb::capsule(kept, [](void* p) noexcept { delete static_cast<T*>(p); })};
+}
+
 /// The same of an image that is moved into the array.
 template <class T>
 ImageArray<T> owned_array(Image<T> image) {
-  auto* const kept = new Image<T>(std::move(image));
-  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<Image<T>*>(p); });
+  const auto [kept, owner] = kept_by_python(std::move(image));
   const std::array<std::size_t, 2> shape{static_cast<std::size_t>(kept->height()),
                                          static_cast<std::size_t>(kept->width())};
   const std::array<std::int64_t, 2> strides{kept->stride(), 1};
@@ -118,14 +130,12 @@ ColourArray owned_array(Image<Rgb8> image);
 /// Memory that the array owns.
 template <class T>
 VectorArray<T> owned_array(std::vector<T> values) {
-  auto* const kept = new std::vector<T>(std::move(values));
-  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  const auto [kept, owner] = kept_by_python(std::move(values));
   return VectorArray<T>(kept->data(), {kept->size()}, owner);
 }
 template <int columns, class T>
 RowsArray<T, columns> owned_rows(std::vector<T> values) {
-  auto* const kept = new std::vector<T>(std::move(values));
-  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+  const auto [kept, owner] = kept_by_python(std::move(values));
   return RowsArray<T, columns>(kept->data(), {kept->size() / columns, static_cast<std::size_t>(columns)}, owner);
 }
 
@@ -136,8 +146,7 @@ auto matrix_array(const Matrix& matrix) {
   std::vector<double> values(static_cast<std::size_t>(rows * columns));
   Eigen::Map<Eigen::Matrix<double, rows, columns, columns == 1 ? Eigen::ColMajor : Eigen::RowMajor>>(values.data()) =
       matrix;
-  auto* const kept = new std::vector<double>(std::move(values));
-  const nb::capsule owner(kept, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
+  const auto [kept, owner] = kept_by_python(std::move(values));
   if constexpr (columns == 1) {
     return nb::ndarray<nb::numpy, double, nb::shape<rows>>(kept->data(), {static_cast<std::size_t>(rows)}, owner);
   } else {

@@ -6,7 +6,6 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,7 +18,6 @@
 #include "bindings/threads.h"
 #include "spartan/calibration/pair_check.h"
 #include "spartan/calibration_io/calibration_files.h"
-#include "spartan/core/files.h"
 #include "spartan/rig/describe.h"
 
 namespace nb = nanobind;
@@ -52,13 +50,7 @@ std::vector<std::string> write(const Rig& rig, const PathText& path, const std::
   const CalibrationFormat format = name ? format_named(*name) : value_of(calibration_format_for_path(path));
   const CalibrationFiles files = value_of(to_calibration_files(rig, format, path));
   const LoadedRig again = value_of(read_back(files, format, rig.cameras.empty() ? ImageSize{} : rig.cameras[0].size));
-  std::vector<NewFile> contents;
-  for (const CalibrationFile& file : files) {
-    const std::string folder = std::filesystem::path(file.path).parent_path().string();
-    if (!folder.empty()) check(make_folder(folder));
-    contents.push_back({file.path, file.content});
-  }
-  check(write_files_atomically(contents));
+  check(write_calibration_files(files));
   std::vector<std::string> lost;
   for (const RigDifference& each : describe_differences(rig, again.rig)) lost.push_back(each.key + ": " + each.text);
   return lost;

@@ -90,8 +90,7 @@ RowsArray<double, 2> project_points(const CameraModelValue& m, const NumberArray
 nb::ndarray<nb::numpy, double, nb::shape<-1, 2, 3>> project_jacobians(const CameraModelValue& m,
                                                                       const NumberArray& points) {
   const Rows rows(points, 3, "points");
-  auto* const values = new std::vector<double>(6 * rows.count(), kNone);
-  const nb::capsule owner(values, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
+  const auto [values, owner] = kept_by_python(std::vector<double>(6 * rows.count(), kNone));
   for (std::size_t i = 0; i < rows.count(); ++i) {
     if (const auto projection = project_with_jacobian(m.model, rows.row<3>(i)))
       Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>>(values->data() + 6 * i) = projection->by_point;

@@ -45,7 +45,7 @@ MapView view_of(SavedMap& saved, const std::optional<Window>& wanted) {
   return value_of(map.view(window_between(west, south, east, north, map.cell_m())));
 }
 
-std::unique_ptr<MapViewValue> view(MapValue& map, const std::optional<Window>& wanted) {
+std::unique_ptr<MapViewValue> make_view(MapValue& map, const std::optional<Window>& wanted) {
   return map.use([&](SavedMap& saved) {
     MapView seen = view_of(saved, wanted);
     Traversability shape = seen.shape(saved.options().mapping.map, ThreadPool(1));
@@ -67,30 +67,12 @@ void export_to(MapValue& map, const PathText& path, const std::optional<Window>&
   }));
 }
 
-void bind_views(nb::module_& m) {
-  nb::class_<MapViewValue>(
+void bind_parts(nb::module_& m) {
+  nb::class_<MapViewValue> view(
       m, "MapView",
       "A rectangle of the global map. Layers are float32 of shape (rows, columns); row 0 lies in the north "
-      "(largest y), NaN is unknown.")
-      .def_prop_ro(
-          "layers", [](const nb::handle& self) { return layers_of(nb::inst_ptr<MapViewValue>(self)->bands, self); },
-          nb::sig("def layers(self) -> dict[str, numpy.typing.NDArray[numpy.float32]]"),
-          "All layers by their names in map files: `elevation_m`, `variance_m2`, `class`, `cost` …")
-      .def(
-          "__getitem__",
-          [](const nb::handle& self, const std::string& name) {
-            return layer_of(nb::inst_ptr<MapViewValue>(self)->bands, name, self);
-          },
-          nb::sig("def __getitem__(self, layer: str, /) -> numpy.typing.NDArray[numpy.float32]"),
-          "One layer; KeyError.")
-      .def_prop_ro(
-          "cell_m", [](const MapViewValue& v) { return v.view.cell_m; }, "Side of a cell, m.")
-      .def_prop_ro(
-          "extent", [](const MapViewValue& v) { return extent_of(v.view.place(), v.view.window.size()); },
-          "(west, east, south, north) in m, as `extent` of matplotlib's imshow.")
-      .def(
-          "render", [](const MapViewValue& v) { return render(v.bands, v.view.kind.view(), v.view.cell_m); },
-          "Elevations in colours with obstacles in red and cavities in blue, uint8, shape (rows, columns, 3).");
+      "(largest y), NaN is unknown.");
+  bind_layers(view);
   nb::class_<MapStop>(m, "MapStop", "A stop whose local map is part of a global map.")
       .def_ro("id", &MapStop::id)
       .def_prop_ro("stamp_ns", [](const MapStop& s) { return s.stamp.ns; })
@@ -106,7 +88,7 @@ void bind_views(nb::module_& m) {
 }  // namespace
 
 void bind_global_maps(nb::module_& m) {
-  bind_views(m);
+  bind_parts(m);
   nb::class_<MapValue>(m, "GlobalMap",
                        "The global map of a run or of a map file; its tiles are read where they are needed.")
       .def_static(
@@ -127,7 +109,7 @@ void bind_global_maps(nb::module_& m) {
           },
           "(west, east, south, north) in m.")
       .def_prop_ro("stops", [](MapValue& map) { return map.use([](SavedMap& s) { return s.map().stops(); }); })
-      .def("view", view, "extent"_a = nb::none(),
+      .def("view", make_view, "extent"_a = nb::none(),
            "A rectangle (west, east, south, north) in m; without one the whole map. Raises Error where it has more "
            "than 8 "
            "million cells.")

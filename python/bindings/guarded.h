@@ -14,7 +14,7 @@ class Guarded {
  public:
   explicit Guarded(T value) : value_(std::move(value)) {}
 
-  /// The result of `function(value)`, which must not touch Python.
+  /// The result of `function(value)`, if any; the function must not touch Python.
   template <class Function>
   auto use(Function&& function) {
     const nanobind::gil_scoped_release free;

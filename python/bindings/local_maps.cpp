@@ -46,7 +46,7 @@ nb::object layer_of(const MapBands& bands, const std::string& name, const nb::ha
   throw nb::key_error(name.c_str());
 }
 
-ColourArray render(const MapBands& bands, ImageView<const GroundClass> kind, double cell_m) {
+ColourArray render(const MapBands& bands, const Image<GroundClass>& kind, double cell_m) {
   ImageView<const float> elevation;
   for (const MapBand& band : bands.list) {
     if (band.name == "elevation_m") elevation = band.values;
@@ -96,31 +96,13 @@ void bind_obstacles(nb::module_& m) {
 
 void bind_local_maps(nb::module_& m) {
   bind_obstacles(m);
-  nb::class_<LocalMapValue>(
+  nb::class_<LocalMapValue> map(
       m, "LocalMap",
       "The terrain around one stop as a grid. Layers are float32 of shape (rows, columns); row 0 lies in "
-      "the north (largest y), NaN is unknown.")
-      .def_prop_ro(
-          "layers", [](const nb::handle& self) { return layers_of(nb::inst_ptr<LocalMapValue>(self)->bands, self); },
-          nb::sig("def layers(self) -> dict[str, numpy.typing.NDArray[numpy.float32]]"),
-          "All layers by their names in map files: `elevation_m`, `variance_m2`, `class`, `cost` …")
-      .def(
-          "__getitem__",
-          [](const nb::handle& self, const std::string& name) {
-            return layer_of(nb::inst_ptr<LocalMapValue>(self)->bands, name, self);
-          },
-          nb::sig("def __getitem__(self, layer: str, /) -> numpy.typing.NDArray[numpy.float32]"),
-          "One layer; KeyError.")
-      .def_prop_ro(
-          "cell_m", [](const LocalMapValue& v) { return v.map.place.cell_m; }, "Side of a cell, m.")
-      .def_prop_ro(
-          "extent", [](const LocalMapValue& v) { return extent_of(v.map.place, v.map.size()); },
-          "(west, east, south, north) in m, as `extent` of matplotlib's imshow.")
-      .def_prop_ro("map_from_body", [](const LocalMapValue& v) { return v.map.map_from_body; })
+      "the north (largest y), NaN is unknown.");
+  bind_layers(map);
+  map.def_prop_ro("map_from_body", [](const LocalMapValue& v) { return v.map.map_from_body; })
       .def_prop_ro("obstacles", [](const LocalMapValue& v) { return v.map.obstacles; })
-      .def(
-          "render", [](const LocalMapValue& v) { return render(v.bands, v.map.kind.view(), v.map.place.cell_m); },
-          "Elevations in colours with obstacles in red and cavities in blue, uint8, shape (rows, columns, 3).")
       .def("save", save, "path"_a, "Writes all layers as GeoTIFF, and a picture beside it (.png).");
   nb::class_<Mapper>(m, "StopMapper", "3D reconstruction of one stop: its views are merged and become a local map.")
       .def(

@@ -114,10 +114,7 @@ void bind_localization(nb::module_& m) {
           [](LocalizerValue& self, std::int64_t stamp, const NumberArray& ahead) {
             const Eigen::Vector3d axis = vector_of<3>(ahead, "ahead_in_body");
             if (!axis.allFinite() || axis.norm() < 1e-6) throw nb::value_error("ahead_in_body: has no direction");
-            self.use([&](Localizer& localizer) {
-              localizer.start(Stamp{stamp}, axis.normalized());
-              return true;
-            });
+            self.use([&](Localizer& localizer) { localizer.start(Stamp{stamp}, axis.normalized()); });
           },
           "stamp_ns"_a, "ahead_in_body"_a,
           "Call once, at the first frame, with the optical axis in the body frame. Samples of the last 10 s that were "

@@ -7,6 +7,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -165,6 +166,18 @@ class PropertyBinder {
   Owner& prototype_;
 };
 
+/// The options that are not the defaults.
+template <class Options>
+std::vector<OptionLine> changed_options(const Options& options) {
+  std::vector<OptionLine> lines = list_options(options);
+  const std::vector<OptionLine> defaults = list_options(Options());
+  std::erase_if(lines, [&](const OptionLine& line) {
+    return std::ranges::any_of(defaults,
+                               [&](const OptionLine& d) { return d.key == line.key && d.value == line.value; });
+  });
+  return lines;
+}
+
 /// Sets attributes by name; raises TypeError for one that does not exist.
 void set_attributes(nb::handle object, const nb::kwargs& values);
 
@@ -198,10 +211,7 @@ void bind_option_class(nb::module_& m) {
   });
   bound.def("__repr__", [name](const Options& o) {
     std::string changed;
-    const auto lines = list_options(o), defaults = list_options(Options());
-    for (std::size_t i = 0; i < lines.size() && i < defaults.size(); ++i) {
-      if (lines[i].value != defaults[i].value) changed += fmt::format(" {}={}", lines[i].key, lines[i].value);
-    }
+    for (const OptionLine& line : changed_options(o)) changed += fmt::format(" {}={}", line.key, line.value);
     return fmt::format("<{}:{}>", name, changed.empty() ? " defaults" : changed);
   });
   bound.def(

@@ -29,11 +29,6 @@ namespace {
 
 using PipelineValue = Guarded<Pipeline>;
 
-template <class T>
-nb::object part(const nb::handle& self, const Image<T> TerrainView::*member) {
-  return nb::cast(shared_array<T>((nb::inst_ptr<TerrainView>(self)->*member).view(), self));
-}
-
 void bind_results(nb::module_& m) {
   nb::class_<TerrainView>(m, "TerrainView", "Dense disparity of one frame with its pose.")
       .def_ro("pair", &TerrainView::pair)
@@ -41,13 +36,13 @@ void bind_results(nb::module_& m) {
       .def_ro("geometry", &TerrainView::geometry)
       .def_ro("world_from_left", &TerrainView::world_from_left, "Pose of the rectified left optical frame.")
       .def_prop_ro(
-          "left", [](const nb::handle& self) { return part(self, &TerrainView::left); },
+          "left", [](const nb::handle& self) { return member_array(self, &TerrainView::left); },
           nb::sig("def left(self) -> numpy.typing.NDArray[numpy.uint8]"), "The rectified left image.")
       .def_prop_ro(
-          "disparity", [](const nb::handle& self) { return part(self, &TerrainView::disparity); },
+          "disparity", [](const nb::handle& self) { return member_array(self, &TerrainView::disparity); },
           nb::sig("def disparity(self) -> numpy.typing.NDArray[numpy.float32]"), "Pixels; NaN where unknown.")
       .def_prop_ro(
-          "sigma", [](const nb::handle& self) { return part(self, &TerrainView::sigma); },
+          "sigma", [](const nb::handle& self) { return member_array(self, &TerrainView::sigma); },
           nb::sig("def sigma(self) -> numpy.typing.NDArray[numpy.float32]"), "Standard deviation, px.");
   nb::class_<MappedStop>(m, "MappedStop", "A stop or keyframe whose map was applied.")
       .def_ro("position_id", &MappedStop::position_id, "-1: a keyframe.")
@@ -82,10 +77,7 @@ void bind_results(nb::module_& m) {
 
 template <class SensorSample>
 void add_sensor(PipelineValue& self, const SensorSample& sample) {
-  self.use([&](Pipeline& pipeline) {
-    pipeline.add(sample);
-    return true;
-  });
+  self.use([&](Pipeline& pipeline) { pipeline.add(sample); });
 }
 
 std::optional<FrameResult> add_frame(PipelineValue& self, const StereoFrame& frame) {
@@ -130,10 +122,7 @@ void bind_pipeline(nb::module_& m) {
       .def(
           "align_with_gravity",
           [](PipelineValue& self, const std::vector<ImuSample>& samples) {
-            self.use([&](Pipeline& pipeline) {
-              pipeline.align_with_gravity(samples);
-              return true;
-            });
+            self.use([&](Pipeline& pipeline) { pipeline.align_with_gravity(samples); });
           },
           "stationary_samples"_a,
           "Before the first frame: the vertical by samples of a rover at rest that are not added themselves.")
@@ -142,10 +131,7 @@ void bind_pipeline(nb::module_& m) {
           [](PipelineValue& self, const NumberArray& up) {
             const Eigen::Vector3d axis = vector_of<3>(up, "up_in_body");
             if (!axis.allFinite() || axis.norm() < 1e-6) throw nb::value_error("up_in_body: has no direction");
-            self.use([&](Pipeline& pipeline) {
-              pipeline.align_with_ground(axis.normalized());
-              return true;
-            });
+            self.use([&](Pipeline& pipeline) { pipeline.align_with_ground(axis.normalized()); });
           },
           "up_in_body"_a, "Before the first frame: the vertical where no sensor measures it.")
       .def(

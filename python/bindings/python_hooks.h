@@ -18,7 +18,7 @@ class PythonHooks {
     const nanobind::gil_scoped_acquire held;
     try {
       function();
-    } catch (...) {
+    } catch (...) {  // of any type: nothing is dropped, rethrow() throws it where Python waits
       raised_ = std::current_exception();
     }
   }

@@ -68,8 +68,7 @@ std::vector<std::string> kinds(const RunResults& run) {
 nb::ndarray<nb::numpy, double, nb::shape<-1, 6, 6>> covariances(const RunResults& run,
                                                                 const std::optional<std::string>& name) {
   const TrajectoryKind kind = kind_of(run, name);
-  auto* const values = new std::vector<double>();
-  const nb::capsule owner(values, [](void* p) noexcept { delete static_cast<std::vector<double>*>(p); });
+  const auto [values, owner] = kept_by_python(std::vector<double>());
   for (const FrameRecord& frame : run.frames) {
     if (const auto pose = pose_of(frame, kind))
       values->insert(values->end(), pose->covariance.data(), pose->covariance.data() + 36);  // symmetric

@@ -14,19 +14,17 @@
 
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
+#include "bindings/option_classes.h"
 #include "bindings/path_text.h"
 #include "bindings/python_hooks.h"
 #include "bindings/recordings.h"
 #include "bindings/threads.h"
+#include "program/simulation_plan.h"
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/report/report.h"
 #include "spartan/system/run.h"
 #include "spartan/system/run_folder.h"
-#ifdef SPARTAN_HAS_SIM
-#include "program/simulation_plan.h"
-#include "spartan/sim/simulator.h"
-#endif
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -34,28 +32,19 @@ using namespace nb::literals;
 namespace spartan::python {
 namespace {
 
-constexpr const char* kSimulation = "sim:";
-
-// Keys whose values differ from the defaults: the noise that a recording states does not replace them.
+// The noise that a recording states does not replace options that were changed.
 GivenKeys changed_keys(const RunOptions& options) {
   GivenKeys keys;
-  const auto lines = list_options(options), defaults = list_options(RunOptions());
-  for (std::size_t i = 0; i < lines.size() && i < defaults.size(); ++i) {
-    if (lines[i].value != defaults[i].value) keys.add(lines[i].key);
-  }
+  for (const OptionLine& line : changed_options(options)) keys.add(line.key);
   return keys;
 }
 
 Result<std::unique_ptr<SampleStream>> open_stream(const std::string& address, const OpenOptions& open, double speed,
                                                   int threads) {
-  if (address.starts_with(kSimulation)) {
-#ifdef SPARTAN_HAS_SIM
-    auto plan = program::plan_simulation(address.substr(std::string(kSimulation).size()), {}, {});
+  if (const auto scenario = program::scenario_of(address)) {
+    auto plan = program::plan_simulation(*scenario, {}, {});
     if (!plan) return failure(plan);
-    return sim::open_live_simulation(std::move(plan->request), speed, ThreadPool(threads));
-#else
-    return failure(ErrorCode::usage, "this build has no simulator", address);
-#endif
+    return program::open_simulation(std::move(*plan), speed, ThreadPool(threads));
   }
   LiveOptions live;
   live.speed = speed;
@@ -66,7 +55,7 @@ Result<std::unique_ptr<SampleStream>> open_stream(const std::string& address, co
 std::string run_input(const RunRequest& request, const RunHooks& hooks, double speed, PythonHooks& python) {
   const nb::gil_scoped_release free;
   Result<RunOutcome> outcome;
-  if (request.input.starts_with(kSimulation) || is_live_address(request.input)) {
+  if (program::scenario_of(request.input) || is_live_address(request.input)) {
     const auto stream = value_of(open_stream(request.input, request.open, speed, request.threads));
     outcome = run_live(*stream, request, hooks);
   } else {

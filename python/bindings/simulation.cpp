@@ -13,9 +13,7 @@
 #include "bindings/path_text.h"
 #include "bindings/python_hooks.h"
 #include "bindings/threads.h"
-#ifdef SPARTAN_HAS_SIM
 #include "program/simulation_plan.h"
-#endif
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -23,7 +21,6 @@ using namespace nb::literals;
 namespace spartan::python {
 namespace {
 
-#ifdef SPARTAN_HAS_SIM
 std::int64_t simulate(const PathText& scenario, const PathText& output, const std::vector<std::string>& set,
                       std::optional<int> seed, bool resume, std::optional<int> threads, const nb::object& progress) {
   const ThreadPool workers = thread_pool(threads);
@@ -37,17 +34,10 @@ std::int64_t simulate(const PathText& scenario, const PathText& output, const st
   program::SimulationPlan plan = value_of(program::plan_simulation(scenario, seed, set));
   plan.request.folder = output;
   plan.request.resume = resume;
-  Result<sim::SimulationReport> report = sim::simulate(plan.request, hooks, workers);
+  Result<sim::SimulationReport> report = program::simulate(plan, hooks, workers);
   python.rethrow();
   return value_of(std::move(report)).frames;
 }
-#else
-std::int64_t simulate(const std::string&, const std::string&, const std::vector<std::string>&, std::optional<int>, bool,
-                      std::optional<int>, const nb::object&) {
-  throw RaisedError(
-      Error{ErrorCode::usage, "this build has no simulator", {}, "install libembree-dev and build again"});
-}
-#endif
 
 }  // namespace
 

@@ -57,23 +57,19 @@ DisparityValue compute_pair(Computer& computer, const RectifiedPairValue& pair, 
   return compute(computer, p.left, p.right, disparity_range(p.geometry, nearest_m), p.left_mask, p.right_mask);
 }
 
-template <class T>
-nb::object part(const nb::handle& self, const Image<T> DisparityValue::*member) {
-  return nb::cast(shared_array<T>((nb::inst_ptr<DisparityValue>(self)->*member).view(), self));
-}
-
 void bind_disparity(nb::module_& m) {
   nb::class_<DisparityValue>(m, "DisparityImage", "Disparities of the rectified left image with their uncertainty.")
       .def_prop_ro(
-          "disparity", [](const nb::handle& self) { return part(self, &DisparityValue::disparity); },
+          "disparity", [](const nb::handle& self) { return member_array(self, &DisparityValue::disparity); },
           nb::sig("def disparity(self) -> numpy.typing.NDArray[numpy.float32]"),
           "x_left - x_right in pixels, float32, shape (height, width); NaN where unknown.")
       .def_prop_ro(
-          "sigma", [](const nb::handle& self) { return part(self, &DisparityValue::sigma); },
+          "sigma", [](const nb::handle& self) { return member_array(self, &DisparityValue::sigma); },
           nb::sig("def sigma(self) -> numpy.typing.NDArray[numpy.float32]"),
           "Standard deviation of each disparity in pixels; NaN where it is unknown or filled.")
       .def_prop_ro(
-          "outlier_percent", [](const nb::handle& self) { return part(self, &DisparityValue::outlier_percent); },
+          "outlier_percent",
+          [](const nb::handle& self) { return member_array(self, &DisparityValue::outlier_percent); },
           nb::sig("def outlier_percent(self) -> numpy.typing.NDArray[numpy.uint8]"),
           "Probability of an error above 1 px in percent; 100 where unknown.")
       .def_ro("milliseconds", &DisparityValue::milliseconds, "Time of the computation.");

@@ -128,14 +128,14 @@ def test_a_localizer_follows_its_motions():
     step = spartan.Pose.exp([0.1, 0, 0, 0, 0, 0])
     for i in range(10):
         at = 10**9 + i * 10**8
-        assert localizer.add_motion(at, at + 10**8, step, 1e-6 * np.eye(6))
+        assert localizer.add_motion(at, at + 10**8, step, 1e-6 * np.identity(6))
     estimate = localizer.estimate()
     np.testing.assert_allclose(estimate.world_from_body.pose.translation, [1, 0, 0], atol=0.05)
     assert estimate.gravity_measured and estimate.health["vision"].state == "ok"
     assert estimate.health["wheels"].state == "missing"
     assert localizer.estimate_at(0) is None
     with pytest.raises(ValueError, match="covariance"):
-        localizer.add_motion(2 * 10**9, 3 * 10**9, step, np.eye(3))
+        localizer.add_motion(2 * 10**9, 3 * 10**9, step, np.identity(3))
 
 
 def test_the_map_of_a_stop_is_that_of_the_run(stops, stops_run):

@@ -1,16 +1,9 @@
 #include "program/live_input.h"
 
-#include <string_view>
-
 #include "program/simulation.h"
+#include "program/simulation_plan.h"
 
 namespace spartan::program {
-namespace {
-
-constexpr std::string_view kSimulation = "sim:";
-
-}  // namespace
-
 void add_live_options(CLI::App& command, LiveArguments& arguments) {
   command
       .add_option("--speed", arguments.options.speed,
@@ -30,12 +23,13 @@ void add_live_options(CLI::App& command, LiveArguments& arguments) {
 }
 
 bool is_live_input(const std::string& input) {
-  return input.starts_with(kSimulation) || is_live_address(input);
+  return scenario_of(input) || is_live_address(input);
 }
 
 Result<std::unique_ptr<SampleStream>> open_live_input(const Context& context, const std::string& address,
                                                       const OpenOptions& open, const LiveArguments& arguments) {
-  if (!address.starts_with(kSimulation)) {
+  const auto scenario = scenario_of(address);
+  if (!scenario) {
     LiveOptions options = arguments.options;
     options.log = context.log;
     return open_live_stream(address, open, options);
@@ -43,7 +37,7 @@ Result<std::unique_ptr<SampleStream>> open_live_input(const Context& context, co
   if (!arguments.options.sensors.empty())
     return failure(ErrorCode::usage, "brings the samples of its sensors along", address, "omit --sensors");
   SimulationArguments simulation;
-  simulation.scenario = address.substr(kSimulation.size());
+  simulation.scenario = *scenario;
   simulation.set = arguments.scenario_keys;
   return open_simulation(context, simulation, arguments.options.speed);
 }

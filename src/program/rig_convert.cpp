@@ -82,17 +82,6 @@ Status check_places(const CalibrationFiles& files, const Context& context) {
   return {};
 }
 
-Status write_all(const CalibrationFiles& files) {
-  std::vector<NewFile> contents;
-  contents.reserve(files.size());
-  for (const CalibrationFile& file : files) {
-    const std::string folder = fs::path(file.path).parent_path().string();
-    if (Status made = folder.empty() ? Status() : make_folder(folder); !made) return made;
-    contents.push_back({file.path, file.content});
-  }
-  return write_files_atomically(contents);
-}
-
 // Names that a reader makes up are not counted as lost.
 bool is_a_name(const RigDifference& difference) {
   return difference.key == "name" || difference.key.ends_with(".name");
@@ -172,7 +161,7 @@ Result<ExitCode> convert(const Context& context, const ConvertArguments& a) {
   if (const Status places = check_places(*files, context); !places) return failure(places);
   const auto lost = losses(*read, *rig, *format, *files);
   if (!lost) return failure(lost);
-  if (const Status written = write_all(*files); !written) return failure(written);
+  if (const Status written = write_calibration_files(*files); !written) return failure(written);
   const std::string text = context.json ? conversion_to_json(*read, *format, *files, *lost)
                                         : conversion_to_text(*read, *format, *files, *lost);
   if (Status printed = print(text); !printed) return failure(printed);

@@ -1,7 +1,5 @@
 #include "program/simulation.h"
 
-#ifdef SPARTAN_HAS_SIM
-
 #include <fmt/format.h>
 
 #include <array>
@@ -34,28 +32,28 @@ Result<ReplacedFolder> replace_recording(const std::string& folder) {
   return ReplacedFolder::set_aside(folder, kEntries);
 }
 
-// Without a folder.
-Result<sim::SimulationRequest> read_request(const Context& context, const SimulationArguments& arguments) {
+Result<SimulationPlan> plan_with_warnings(const Context& context, const SimulationArguments& arguments) {
   auto plan = plan_simulation(arguments.scenario, arguments.seed, arguments.set);
-  if (!plan) return failure(plan);
-  for (const std::string& warning : plan->warnings) context.log.warning(warning);
-  return std::move(plan->request);
+  if (plan) {
+    for (const std::string& warning : plan->warnings) context.log.warning(warning);
+  }
+  return plan;
 }
 
 }  // namespace
 
 Result<std::unique_ptr<SampleStream>> open_simulation(const Context& context, const SimulationArguments& arguments,
                                                       double speed) {
-  auto request = read_request(context, arguments);
-  if (!request) return failure(request);
-  return sim::open_live_simulation(std::move(*request), speed, ThreadPool(context.threads));
+  auto plan = plan_with_warnings(context, arguments);
+  if (!plan) return failure(plan);
+  return open_simulation(std::move(*plan), speed, ThreadPool(context.threads));
 }
 
 Result<SimulationOutcome> simulate_scenario(const Context& context, const SimulationArguments& arguments) {
-  auto request = read_request(context, arguments);
-  if (!request) return failure(request);
-  request->folder = arguments.output;
-  request->resume = arguments.resume;
+  auto plan = plan_with_warnings(context, arguments);
+  if (!plan) return failure(plan);
+  plan->request.folder = arguments.output;
+  plan->request.resume = arguments.resume;
   if (!arguments.resume) {
     if (Status s = expect_new_folder(context, arguments.output); !s) return failure(s);
   }
@@ -67,7 +65,7 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
   hooks.should_stop = interrupted;
   hooks.progress = [&progress](const sim::SimulationProgress& p) { progress.show(p.done, p.frames, "frames"); };
   Stopwatch watch;
-  const auto report = sim::simulate(*request, hooks, ThreadPool(context.threads));
+  const auto report = simulate(*plan, hooks, ThreadPool(context.threads));
   if (!report) return failure(report);
   replaced->discard();
   const double seconds = 1e-3 * watch.lap();
@@ -85,27 +83,3 @@ Result<SimulationOutcome> simulate_scenario(const Context& context, const Simula
 }
 
 }  // namespace spartan::program
-
-#else
-
-namespace spartan::program {
-namespace {
-
-tl::unexpected<Error> no_simulator() {
-  return failure(ErrorCode::usage, "this build has no simulator, because Embree was not found", {},
-                 "install libembree-dev and build again");
-}
-
-}  // namespace
-
-Result<SimulationOutcome> simulate_scenario(const Context&, const SimulationArguments&) {
-  return no_simulator();
-}
-
-Result<std::unique_ptr<SampleStream>> open_simulation(const Context&, const SimulationArguments&, double) {
-  return no_simulator();
-}
-
-}  // namespace spartan::program
-
-#endif

@@ -1,5 +1,16 @@
 #include "program/simulation_plan.h"
 
+namespace spartan::program {
+
+std::optional<std::string> scenario_of(const std::string& input) {
+  const std::string scheme = "sim:";
+  return input.starts_with(scheme) ? std::optional(input.substr(scheme.size())) : std::nullopt;
+}
+
+}  // namespace spartan::program
+
+#ifdef SPARTAN_HAS_SIM
+
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -99,4 +110,41 @@ Result<SimulationPlan> plan_simulation(const std::string& name, std::optional<in
                         std::move(read->warnings)};
 }
 
+Result<sim::SimulationReport> simulate(const SimulationPlan& plan, const sim::SimulationHooks& hooks,
+                                       const ThreadPool& workers) {
+  return sim::simulate(plan.request, hooks, workers);
+}
+
+Result<std::unique_ptr<SampleStream>> open_simulation(SimulationPlan plan, double speed, const ThreadPool& workers) {
+  return sim::open_live_simulation(std::move(plan.request), speed, workers);
+}
+
 }  // namespace spartan::program
+
+#else
+
+namespace spartan::program {
+namespace {
+
+tl::unexpected<Error> no_simulator() {
+  return failure(ErrorCode::usage, "this build has no simulator, because Embree was not found", {},
+                 "install libembree-dev and build again");
+}
+
+}  // namespace
+
+Result<SimulationPlan> plan_simulation(const std::string&, std::optional<int>, const std::vector<std::string>&) {
+  return no_simulator();
+}
+
+Result<sim::SimulationReport> simulate(const SimulationPlan&, const sim::SimulationHooks&, const ThreadPool&) {
+  return no_simulator();
+}
+
+Result<std::unique_ptr<SampleStream>> open_simulation(SimulationPlan, double, const ThreadPool&) {
+  return no_simulator();
+}
+
+}  // namespace spartan::program
+
+#endif

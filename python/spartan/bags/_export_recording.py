@@ -34,7 +34,7 @@ def _camera_info(bag: BagWriter, rig: _core.Rig, pair: _core.StereoPair, side: s
     camera_info does not know are left to the rig in DESCRIPTION_TOPIC."""
     camera = rig.camera(getattr(pair, side))
     values, messages = camera.model.parameters, bag.messages
-    k, p, distortion, name = np.eye(3), np.zeros((3, 4)), np.zeros(5), "plumb_bob"
+    k, p, distortion, name = np.identity(3), np.zeros((3, 4)), np.zeros(5), "plumb_bob"
     if "focal_px" in values:
         (fx, fy), (cx, cy) = values["focal_px"], values["centre_px"]
         k = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
@@ -48,10 +48,10 @@ def _camera_info(bag: BagWriter, rig: _core.Rig, pair: _core.StereoPair, side: s
         name = ""
     p[:, :3] = k
     right_from_left = rig.right_from_left(pair.name)
-    if side == "right" and np.array_equal(right_from_left.rotation, np.eye(3)):
+    if side == "right" and np.array_equal(right_from_left.rotation, np.identity(3)):
         p[0, 3] = k[0, 0] * right_from_left.translation[0]
     keys = ("D", "K", "R", "P") if messages.ros1 else ("d", "k", "r", "p")
-    matrices = (distortion.astype(np.float64), k.reshape(-1), np.eye(3).reshape(-1), p.reshape(-1))
+    matrices = (distortion.astype(np.float64), k.reshape(-1), np.identity(3).reshape(-1), p.reshape(-1))
     region = messages.make("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
     return messages.make("sensor_msgs/CameraInfo", header=messages.header(stamp_ns, optical_frame(pair.name, side)),
                          height=camera.size[1], width=camera.size[0], distortion_model=name, binning_x=0, binning_y=0,

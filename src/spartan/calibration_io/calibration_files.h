@@ -125,6 +125,8 @@ using CalibrationFiles = std::vector<CalibrationFile>;
 /// naming camera and reason, if the format cannot represent a camera model or all cameras. Other information (names,
 /// pixel formats, masks, pan-tilt units, a skew below 0.01 px across the image) is dropped; see describe_differences().
 Result<CalibrationFiles> to_calibration_files(const Rig& rig, CalibrationFormat format, const std::string& path);
+/// Writes them, with the folders they are in: all of them, or none. Code `output`.
+Status write_calibration_files(const CalibrationFiles& files);
 
 /// The rig reduced to one pair, its cameras and their mounts.
 Rig rig_of_pair(const Rig& rig, const StereoPair& pair);

@@ -120,4 +120,15 @@ Result<CalibrationFiles> to_calibration_files(const Rig& rig, CalibrationFormat 
   return write_as(*unskewed, format, path);
 }
 
+Status write_calibration_files(const CalibrationFiles& files) {
+  std::vector<NewFile> contents;
+  contents.reserve(files.size());
+  for (const CalibrationFile& file : files) {
+    const std::string folder = std::filesystem::path(file.path).parent_path().string();
+    if (Status made = folder.empty() ? Status() : make_folder(folder); !made) return made;
+    contents.push_back({file.path, file.content});
+  }
+  return write_files_atomically(contents);
+}
+
 }  // namespace spartan
