@@ -70,10 +70,15 @@ class Run:
         """The global map. Raises Error where the run has none."""
         return _core.GlobalMap.open(self._results.path)
 
+    @property
+    def terrain_stamps_ns(self) -> list[int]:
+        """Stamps of the terrain views along the path; their files are `terrain/<stamp>.pfm` and `.ply`."""
+        return self._results.terrain_stamps_ns
+
     def point_clouds(self) -> list[_core.PointCloud]:
         """The terrain along the path in the world frame, a cloud for each view."""
         folder = self.path / "terrain"
-        files = [folder / f"{stamp}.ply" for stamp in self._results.terrain_stamps_ns]
+        files = [folder / f"{stamp}.ply" for stamp in self.terrain_stamps_ns]
         return [_core.PointCloud.load(str(file)) for file in files if file.exists()]
 
     def export(self, format: str, path: StrPath, *, trajectory: str | None = None, threads: int | None = None) -> None:

@@ -123,10 +123,11 @@ def _write_poses(out: BagWriter, run: Run) -> None:
 
 def _write_terrain(out: BagWriter, run: Run) -> None:
     imager = _core.Imager(run.rig, run.options.imaging, threads=1, mask_folder=run.path)
-    for record in run.frames:
-        best, stamp = _best(record), record.stamp_ns
-        files = run.path / "terrain"
-        if best is None or not (files / f"{stamp}.pfm").exists():
+    records, files = {record.stamp_ns: record for record in run.frames}, run.path / "terrain"
+    for stamp in run.terrain_stamps_ns:
+        record = records[stamp]
+        best = _best(record)
+        if best is None or not (files / f"{stamp}.pfm").exists():  # the disk was full
             continue
         values = _core.read_disparity(files / f"{stamp}.pfm")
         out.write(f"/{record.pair}/disparity", stamp,

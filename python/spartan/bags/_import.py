@@ -23,6 +23,7 @@ from spartan import _core
 from spartan._errors import Error
 from spartan.bags._export_recording import DESCRIPTION_TOPIC
 
+_MOST_WAITING = 64  # images of one side without a partner
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _LAYOUTS = {
     "mono8": "gray", "8UC1": "gray", "mono16": "gray", "16UC1": "gray", "rgb8": "rgb", "bgr8": "rgb", "8UC3": "rgb",
@@ -303,7 +304,7 @@ class _Importer:
                     return  # its details come after the images
             self.add(self.frame(pair, waiting))
         for images in (waiting.left, waiting.right):
-            while len(images) > max(keep, 0) + 60:
+            while len(images) > _MOST_WAITING:
                 images.popleft()
                 self.counts["unpaired"] += 1
 
@@ -330,6 +331,35 @@ class _Importer:
         return self.counts
 
 
+def _choose_topics(bag: _Bag, pairs: list[str] | None, wanted: dict[str, str | None]) -> Topics:
+    """The topics that were named, and guesses for the others. Raises Error where the bag has not got them."""
+    types = bag.types()
+    topics = guess_topics(types, pairs)
+    if wanted["left"] is not None and wanted["right"] is not None:
+        topics.pairs = [PairTopics("stereo", wanted["left"], wanted["right"])]
+    topics.imu, topics.wheels = wanted["imu"] or topics.imu, wanted["wheels"] or topics.wheels
+    topics.pairs = [pair for pair in topics.pairs if pair.left in types and pair.right in types] or topics.pairs
+    missing = sorted(topics.all() - set(types))
+    if missing or not topics.pairs:
+        what = f"has no topic {', '.join(missing)}" if missing else "has no images of a left and a right camera"
+        hint = f"its topics: {', '.join(sorted(types))}; name them with --left and --right"
+        raise Error("input", what, str(bag.path), hint)
+    return topics
+
+
+def _choose_rig(bag: _Bag, topics: Topics, described: str | None, file: str | os.PathLike[str] | None) -> _core.Rig:
+    """The rig of a file, that which Spartan wrote into the bag, or a guess. A single pair of topics takes its name."""
+    if file is not None:
+        rig = _core.read_rig(file)
+    elif described is not None:
+        return _core.Rig.from_yaml(described)
+    else:
+        rig = _guessed_rig(bag, topics.pairs[0], topics.imu)
+    if len(topics.pairs) == 1:
+        topics.pairs[0].name = rig.pairs[0].name
+    return rig
+
+
 def import_bag(
     bag: str | os.PathLike[str], recording: str | os.PathLike[str], *, left: str | None = None, right: str | None = None,
     imu: str | None = None, wheels: str | None = None, rig: str | os.PathLike[str] | None = None,
@@ -343,26 +373,13 @@ def import_bag(
     """
     opened = _Bag(bag)
     try:
-        types = opened.types()
-        text = opened.first(DESCRIPTION_TOPIC) if DESCRIPTION_TOPIC in types and left is None and right is None else None
-        about = {} if text is None else json.loads(text.data)
-        known = _core.Rig.from_yaml(about["rig"]) if about else None
-        topics = guess_topics(types, None if known is None else [pair.name for pair in known.pairs])
-        if left is not None and right is not None:
-            topics.pairs = [PairTopics("stereo", left, right)]
-        topics.imu, topics.wheels = imu or topics.imu, wheels or topics.wheels
-        topics.pairs = [pair for pair in topics.pairs if pair.left in types and pair.right in types] or topics.pairs
-        missing = sorted(topics.all() - set(types))
-        if missing or not topics.pairs:
-            what = f"has no topic {', '.join(missing)}" if missing else "has no images of a left and a right camera"
-            raise Error("input", what, str(bag), f"its topics: {', '.join(sorted(types))}; name them with --left and --right")
-        if rig is not None:
-            known = _core.read_rig(rig)
-            if len(topics.pairs) == 1:
-                topics.pairs[0].name = known.pairs[0].name
-        chosen = _guessed_rig(opened, topics.pairs[0], topics.imu) if known is None else known
-        if known is None:
-            topics.pairs[0].name = chosen.pairs[0].name
+        text = None
+        if DESCRIPTION_TOPIC in opened.types() and left is None and right is None:
+            text = opened.first(DESCRIPTION_TOPIC)
+        about: dict[str, Any] = {} if text is None else json.loads(text.data)
+        pairs = [pair.name for pair in _core.Rig.from_yaml(about["rig"]).pairs] if about else None
+        topics = _choose_topics(opened, pairs, {"left": left, "right": right, "imu": imu, "wheels": wheels})
+        chosen = _choose_rig(opened, topics, about.get("rig"), rig)
         noise = _core.SensorNoise()
         if about and rig is None:
             noise.imu = _core.ImuNoise.from_yaml(about["noise"]["imu"])
