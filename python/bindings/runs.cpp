@@ -3,10 +3,7 @@
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
 
-#include <chrono>
-#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
@@ -130,7 +127,7 @@ void bind_runs(nb::module_& m) {
         request.max_frames = max_frames;
         request.resume = resume;
         request.replace = replace;
-        request.record = request.recorded_images == ImageFiles::pnm;
+        request.record = true;  // of a live stream
         return run_folder(input, output, options, open_options(rig, format, left, right, fps), request, speed, progress,
                           frame);
       },

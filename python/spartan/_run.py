@@ -119,7 +119,7 @@ def run(
     max_frames: number of stereo frames to process; 0: all.
     speed: pace of a replay or a simulation.
     truth: ground truth for the report, a trajectory file or a recording; None: that of the recording.
-    report: also write the report page, `report/index.html`.
+    report: also write the report page, `report/index.html`, of a recording.
     progress, frame: called after each frame. An exception that one raises ends the run; so does Ctrl-C. What was done
         is in the folder, and `resume=True` goes on.
 
