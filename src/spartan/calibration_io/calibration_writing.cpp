@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <vector>
 
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/calibration_io/internal/calibration_writers.h"
+#include "spartan/core/files.h"
 #include "spartan/rig/models/camera_model.h"
 
 namespace spartan {
