@@ -1,11 +1,12 @@
 # Entry points. Every target installs what it needs first (./setup, quick where nothing is missing).
-.PHONY: help demo test faults build bench recordings format lint docs coverage clean
+.PHONY: help demo test faults build package bench recordings format lint docs coverage clean
 
 help:
 	@echo "make demo      build, then a drive over a simulated Mars (or INPUT=path); demo_output/report.html shows it"
 	@echo "make test      build, then run the fast tests"
 	@echo "make faults    long runs under injected faults and with damaged inputs; prints both tables (hours)"
 	@echo "make build     the program: build/release/bin/spartan"
+	@echo "make package   Debian packages and a Python wheel: build/packages"
 	@echo "make bench     all benchmarks; make bench-NAME: the one of bench/NAME.cpp"
 	@echo "make recordings  the standard simulated recordings, once, into ~/.cache/spartan (an hour)"
 	@echo "make format    format the C++ files"
@@ -17,6 +18,10 @@ help:
 build:
 	./setup build
 	scripts/build release
+
+package:
+	./setup build package
+	scripts/package
 
 demo:
 	./setup build

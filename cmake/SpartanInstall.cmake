@@ -6,13 +6,13 @@ set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/spartan)
 get_property(modules GLOBAL PROPERTY SPARTAN_MODULES)
 list(REMOVE_ITEM modules testing)
 list(TRANSFORM modules PREPEND spartan_)
-install(TARGETS ${modules} spartan EXPORT spartanTargets)
-install(EXPORT spartanTargets NAMESPACE spartan:: DESTINATION ${package_folder})
+install(TARGETS ${modules} spartan EXPORT spartanTargets COMPONENT development)
+install(EXPORT spartanTargets NAMESPACE spartan:: DESTINATION ${package_folder} COMPONENT development)
 
-install(DIRECTORY src/spartan DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+install(DIRECTORY src/spartan DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development
   FILES_MATCHING PATTERN "*.h" PATTERN "internal" EXCLUDE PATTERN "testing" EXCLUDE PATTERN "numerics" EXCLUDE PATTERN "figures" EXCLUDE)
 if(EXISTS ${PROJECT_SOURCE_DIR}/config)
-  install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/spartan)
+  install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DATADIR}/spartan COMPONENT program)
 endif()
 
 # The components of the package: for each module what it uses, and the packages of the libraries that it links.
@@ -36,4 +36,4 @@ endforeach()
 configure_package_config_file(cmake/spartanConfig.cmake.in spartanConfig.cmake INSTALL_DESTINATION ${package_folder})
 write_basic_package_version_file(spartanConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/spartanConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/spartanConfigVersion.cmake
-  DESTINATION ${package_folder})
+  DESTINATION ${package_folder} COMPONENT development)

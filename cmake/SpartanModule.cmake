@@ -11,6 +11,9 @@ target_compile_options(spartan_flags INTERFACE
   $<$<AND:$<BOOL:${CMAKE_UNITY_BUILD}>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage>
   $<$<BOOL:${SPARTAN_WERROR}>:-Werror>
   $<$<AND:$<BOOL:${SPARTAN_WERROR}>,$<CXX_COMPILER_ID:GNU>>:-Wno-error=array-bounds>)
+# Builds in other folders give the same bytes.
+target_compile_options(spartan_flags INTERFACE
+  $<$<CONFIG:Release>:-ffile-prefix-map=${PROJECT_SOURCE_DIR}/=>)
 # Highway leaves out AVX-512 with VPOPCNTB and VBMI (Ice Lake, Zen 4) unless it is asked for it.
 target_compile_definitions(spartan_flags INTERFACE HWY_WANT_AVX3_DL)
 # On ARM the kernels are those of NEON: structures of them hold vectors, which SVE does not allow, and GCC inlines the
@@ -160,5 +163,5 @@ function(spartan_plugin name source)
     CXX_VISIBILITY_PRESET default)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/src)
   target_link_libraries(${name} PRIVATE spartan_flags ${ARGN})
-  install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/spartan)
+  install(TARGETS ${name} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/spartan COMPONENT cameras)
 endfunction()
