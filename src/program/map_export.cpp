@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "program/map.h"
@@ -66,8 +67,10 @@ Status write_map(SavedMap& saved, const MapExportArguments& a, const Context& co
   const auto view = saved.map().view(*window);
   if (!view) return failure(view);
   if (!knows_a_cell(*view)) context.log.warning("--window: no cell of it is known");
-  return export_map(*view, {*format, a.layers, saved.options().mapping.map, saved.about()}, ThreadPool(context.threads),
-                    a.output);
+  auto points = *format == MapFormat::gltf ? saved.points() : Result<PointCloud>();
+  if (!points) return failure(points);
+  return export_map(*view, {*format, a.layers, saved.options().mapping.map, saved.about(), std::move(*points)},
+                    ThreadPool(context.threads), a.output);
 }
 
 Result<ExitCode> export_command(const Context& context, const MapExportArguments& a) {
@@ -93,8 +96,8 @@ void add_map_export(CLI::App& map, Context& context) {
       ->add_option(
           "-o,--output", a->output,
           "File to write; its extension selects the format: .tif (GeoTIFF), .png (figure), .ply or .pcd "
-          "(points, one a cell), .bt (OctoMap), .asc (ESRI ASCII grid), .yaml (occupancy grid of ROS and Nav2, "
-          "with a .pgm beside it), .map.")
+          "(points, one a cell), .bt (OctoMap), .glb (glTF mesh in the colours of the images), .asc (ESRI ASCII grid), "
+          ".yaml (occupancy grid of ROS and Nav2, with a .pgm beside it), .map.")
       ->required();
   command
       ->add_option(

@@ -4,6 +4,8 @@
 #include <stdexcept>
 
 #ifdef SPARTAN_HAS_GDAL
+#include <fmt/format.h>
+#include <gdal_frmts.h>
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>
 
@@ -11,6 +13,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -72,12 +75,16 @@ class GdalErrors {
 
 using Dataset = std::unique_ptr<GDALDataset, CloseDataset>;
 
+void register_drivers() {
+  GDALRegister_GTiff();
+  GDALRegister_MEM();
+  GDALRegister_COG();
+}
+
 // A raster of classes alone: bytes, for which TIFF has colour tables.
 bool is_classes(const std::vector<MapBand>& bands) {
   return bands.size() == 1 && !bands.front().categories.empty();
 }
-
-constexpr int kLargestWithoutOverviews = 512;  // cells a side
 
 // "m2" of "variance_m2".
 std::string unit_of(const std::string& name) {
@@ -109,33 +116,79 @@ bool set_colours(GDALRasterBand& band, const std::vector<MapCategory>& categorie
   return band.SetColorTable(&colours) == CE_None;
 }
 
-bool write_bands(GDALDataset& dataset, const std::vector<MapBand>& bands) {
-  for (std::size_t i = 0; i < bands.size(); ++i) {
-    GDALRasterBand* const band = dataset.GetRasterBand(static_cast<int>(i) + 1);
-    const ImageView<const float>& values = bands[i].values;
-    band->SetDescription(bands[i].name.c_str());
-    band->SetUnitType(unit_of(bands[i].name).c_str());
-    band->SetNoDataValue(is_classes(bands) ? 0 : std::numeric_limits<double>::quiet_NaN());
-    if (is_classes(bands) && !set_colours(*band, bands[i].categories)) return false;
-    // RasterIO takes a void* in both directions; with GF_Write it does not change the data.
-    const CPLErr error =
-        band->RasterIO(GF_Write, 0, 0, values.width(), values.height(), const_cast<float*>(values.data()),
-                       values.width(), values.height(), GDT_Float32, 0,
-                       static_cast<GSpacing>(values.stride()) * static_cast<GSpacing>(sizeof(float)), nullptr);
-    if (error != CE_None) return false;
-  }
-  return true;
+// Lowest, highest, mean, standard deviation and share of the known cells, as `gdalinfo -stats` would compute them. GDAL's
+// own function fails on bands without a known cell.
+bool set_statistics(GDALRasterBand& band, const ImageView<const float>& values) {
+  double lowest = std::numeric_limits<double>::infinity(), highest = -lowest, sum = 0, squares = 0;
+  std::int64_t known = 0;
+  const auto each_known = [&values](const auto& visit) {
+    for (int y = 0; y < values.height(); ++y) {
+      for (int x = 0; x < values.width(); ++x) {
+        if (!std::isnan(values(x, y))) visit(static_cast<double>(values(x, y)));
+      }
+    }
+  };
+  each_known([&](double value) {
+    lowest = std::min(lowest, value);
+    highest = std::max(highest, value);
+    sum += value;
+    ++known;
+  });
+  if (known == 0) return true;
+  const double count = static_cast<double>(known), mean = sum / count;
+  each_known([&](double value) { squares += (value - mean) * (value - mean); });
+  const double percent = 100 * count / (static_cast<double>(values.width()) * values.height());
+  return band.SetStatistics(lowest, highest, mean, std::sqrt(squares / count)) == CE_None &&
+         band.SetMetadataItem("STATISTICS_VALID_PERCENT", fmt::format("{:.4g}", percent).c_str()) == CE_None;
 }
 
-bool build_overviews(GDALDataset& dataset) {
-  std::vector<int> factors;
-  const int side = std::max(dataset.GetRasterXSize(), dataset.GetRasterYSize());
-  for (int factor = 2; side > kLargestWithoutOverviews * factor / 2; factor *= 2) factors.push_back(factor);
-  if (factors.empty()) return true;
-  dataset.FlushCache(false);  // a failure reaches the error handler
-  return dataset.BuildOverviews("NEAREST", static_cast<int>(factors.size()), factors.data(), 0, nullptr, nullptr,
-                                nullptr) == CE_None;
-}
+// A dataset of GDAL in memory. Float bands are the values themselves; `classes` are the bytes of a band of classes.
+class MapInMemory {
+ public:
+  MapInMemory(ImageSize size, const std::vector<MapBand>& bands) : size_(size), bands_(&bands) {
+    GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("MEM");
+    dataset_.reset(driver->Create("", size.width, size.height, 0, GDT_Float32, nullptr));
+    if (is_classes(bands)) classes_ = as_bytes(bands.front().values);
+    complete_ = dataset_ != nullptr;
+    for (std::size_t i = 0; complete_ && i < bands.size(); ++i) complete_ = add(static_cast<int>(i) + 1, bands[i]);
+  }
+  bool complete() const { return complete_; }
+  GDALDataset& dataset() { return *dataset_; }
+
+ private:
+  static Image<std::uint8_t> as_bytes(const ImageView<const float>& values) {
+    Image<std::uint8_t> bytes(values.width(), values.height());
+    for (int y = 0; y < values.height(); ++y) {
+      std::transform(values.row(y), values.row(y) + values.width(), bytes.row(y), [](float value) {
+        return static_cast<std::uint8_t>(std::isnan(value) ? 0.F : value);
+      });
+    }
+    return bytes;
+  }
+
+  // GDAL takes the address of the values as text; it does not change a source of CreateCopy().
+  bool add(int number, const MapBand& band) {
+    const bool bytes = is_classes(*bands_);
+    const void* const address = bytes ? static_cast<const void*>(classes_.row(0)) : band.values.data();
+    const std::string at = fmt::format("DATAPOINTER=0x{:x}", reinterpret_cast<std::uintptr_t>(address));
+    const auto row_bytes = bytes ? static_cast<std::size_t>(classes_.view().stride())
+                                 : static_cast<std::size_t>(band.values.stride()) * sizeof(float);
+    const std::string line = fmt::format("LINEOFFSET={}", row_bytes);
+    std::array<const char*, 3> options{at.c_str(), line.c_str(), nullptr};
+    if (dataset_->AddBand(bytes ? GDT_Byte : GDT_Float32, const_cast<char**>(options.data())) != CE_None) return false;
+    GDALRasterBand& added = *dataset_->GetRasterBand(number);
+    added.SetDescription(band.name.c_str());
+    added.SetUnitType(unit_of(band.name).c_str());
+    added.SetNoDataValue(bytes ? 0 : std::numeric_limits<double>::quiet_NaN());
+    return bytes ? set_colours(added, band.categories) : set_statistics(added, band.values);
+  }
+
+  ImageSize size_;
+  const std::vector<MapBand>* bands_;
+  Image<std::uint8_t> classes_;
+  Dataset dataset_;
+  bool complete_ = false;
+};
 
 // GDAL keeps names of categories in a file beside a GeoTIFF; empty where there are none.
 std::string sidecar_text(const std::vector<MapBand>& bands) {
@@ -206,27 +259,33 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
   }
   expect_memory_for_gdal(size, bands.size());
   GdalErrors errors;  // not const: the error handler of GDAL writes to it
-  GDALRegister_GTiff();
+  register_drivers();
   const std::string temporary = temporary_name(path);
-  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
-  const std::array<const char*, 6> options{"COMPRESS=DEFLATE", is_classes(bands) ? "PREDICTOR=1" : "PREDICTOR=3",
-                                           "TILED=YES",        "NUM_THREADS=1",
-                                           "BIGTIFF=IF_SAFER", nullptr};
-  Dataset dataset(driver->Create(temporary.c_str(), size.width, size.height, static_cast<int>(bands.size()),
-                                 is_classes(bands) ? GDT_Byte : GDT_Float32, const_cast<char**>(options.data())));
-  if (dataset) {
-    const bool complete =
-        describe(*dataset, place, description) && write_bands(*dataset, bands) && build_overviews(*dataset);
-    dataset.reset();  // writes the last blocks: a full disk is reported here
+  MapInMemory map(size, bands);
+  if (map.complete() && describe(map.dataset(), place, description)) {
+    GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("COG");
+    const std::array<const char*, 8> options{"COMPRESS=DEFLATE",
+                                             is_classes(bands) ? "PREDICTOR=NO" : "PREDICTOR=FLOATING_POINT",
+                                             "NUM_THREADS=1",
+                                             "BIGTIFF=IF_SAFER",
+                                             "BLOCKSIZE=512",
+                                             "OVERVIEW_RESAMPLING=NEAREST",
+                                             "OVERVIEW_COMPRESS=DEFLATE",
+                                             nullptr};
+    Dataset written(driver->CreateCopy(temporary.c_str(), &map.dataset(), 0, const_cast<char**>(options.data()),
+                                       nullptr, nullptr));
+    const bool complete = written != nullptr;
+    written.reset();  // writes the last blocks: a full disk is reported here
     if (complete && !errors.any() && holds(temporary, bands)) return publish(temporary, path, bands);
   }
   std::remove(temporary.c_str());
+  std::remove((temporary + ".ovr.tmp").c_str());  // overviews before they are put into the file
   return errors.error(ErrorCode::output, "cannot be written: ", path);
 }
 
 Result<LoadedMap> read_geotiff(const std::string& path) {
   GdalErrors errors;  // not const: the error handler of GDAL writes to it
-  GDALRegister_GTiff();
+  register_drivers();
   const Dataset dataset = open_geotiff(path);
   std::array<double, 6> transform{};
   if (!dataset || dataset->GetGeoTransform(transform.data()) != CE_None)

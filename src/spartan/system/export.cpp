@@ -9,6 +9,7 @@
 #include "spartan/core/files.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/rig/rig.h"
+#include "spartan/system/internal/exported_trajectory.h"
 #include "spartan/system/internal/terrain_files.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
@@ -20,14 +21,19 @@ using namespace internal;
 
 namespace {
 
-constexpr std::array<std::pair<std::string_view, ExportFormat>, 8> kFormats{{{"tum", ExportFormat::tum},
-                                                                             {"kitti", ExportFormat::kitti},
-                                                                             {"euroc", ExportFormat::euroc},
-                                                                             {"csv", ExportFormat::csv},
-                                                                             {"geotiff", ExportFormat::geotiff},
-                                                                             {"octomap", ExportFormat::octomap},
-                                                                             {"ply", ExportFormat::ply},
-                                                                             {"pcd", ExportFormat::pcd}}};
+constexpr std::array kFormats{
+    ExportDescription{"tum", ExportFormat::tum, ".tum", "trajectory: stamp, position, quaternion (TUM, evo)"},
+    ExportDescription{"kitti", ExportFormat::kitti, ".txt",
+                      "trajectory: 3x4 matrices of the left camera from its first frame (KITTI)"},
+    ExportDescription{"euroc", ExportFormat::euroc, ".csv", "trajectory: stamp in ns, position, quaternion (EuRoC)"},
+    ExportDescription{"csv", ExportFormat::csv, ".csv", "trajectory with status, standard deviations and inliers"},
+    ExportDescription{"colmap", ExportFormat::colmap, "folder",
+                      "rectified images with their poses (COLMAP text model); needs --recording"},
+    ExportDescription{"geotiff", ExportFormat::geotiff, ".tif", "global map, all layers (cloud-optimized GeoTIFF)"},
+    ExportDescription{"gltf", ExportFormat::gltf, ".glb", "global map as a mesh in the colours of the images (glTF)"},
+    ExportDescription{"octomap", ExportFormat::octomap, ".bt", "global map as an octree (OctoMap)"},
+    ExportDescription{"ply", ExportFormat::ply, ".ply", "terrain point clouds (PLY: Open3D, MeshLab, CloudCompare)"},
+    ExportDescription{"pcd", ExportFormat::pcd, ".pcd", "terrain point clouds (PCD: PCL)"}};
 
 Result<std::string> kitti_text(const RunFolder& folder, const std::vector<FrameRecord>& frames, TrajectoryKind kind) {
   const auto rig = read_rig_yaml(folder.rig());
@@ -71,7 +77,9 @@ Result<std::string> trajectory_text(const RunFolder& folder, ExportFormat format
       return kitti_text(folder, frames, kind);
     case ExportFormat::csv:
       return csv_text(frames, kind);
+    case ExportFormat::colmap:
     case ExportFormat::geotiff:
+    case ExportFormat::gltf:
     case ExportFormat::octomap:
     case ExportFormat::ply:
     case ExportFormat::pcd:
@@ -91,7 +99,10 @@ Status export_whole_map(const std::string& run_folder, MapFormat format, const T
   if (!saved) return failure(saved);
   const auto view = saved->map().view(saved->map().extent());
   if (!view) return failure(view);
-  return export_map(*view, {format, {}, saved->options().mapping.map, saved->about()}, workers, path);
+  auto points = format == MapFormat::gltf ? saved->points() : Result<PointCloud>();
+  if (!points) return failure(points);
+  return export_map(*view, {format, {}, saved->options().mapping.map, saved->about(), std::move(*points)}, workers,
+                    path);
 }
 
 Status export_terrain(const RunFolder& folder, RunStore& store, ExportFormat format, const std::string& path) {
@@ -104,11 +115,25 @@ Status export_terrain(const RunFolder& folder, RunStore& store, ExportFormat for
 
 }  // namespace
 
+Result<TrajectoryKind> internal::exported_trajectory(const RunFolder& folder, const std::vector<FrameRecord>& frames,
+                                                     std::optional<TrajectoryKind> wanted) {
+  if (frames.empty()) return failure(ErrorCode::input, "contains no frames", folder.store());
+  if (wanted && !has_trajectory(frames, *wanted)) {
+    return failure(ErrorCode::input, fmt::format("holds no {} trajectory", name_of(*wanted)), folder.path,
+                   "run without --odometry-only");
+  }
+  return wanted.value_or(best_of(frames));
+}
+
+std::span<const ExportDescription> export_descriptions() {
+  return kFormats;
+}
+
 Result<ExportFormat> parse_export_format(std::string_view name) {
   std::string known;
-  for (const auto& [text, format] : kFormats) {
-    if (text == name) return format;
-    known += (known.empty() ? "" : ", ") + std::string(text);
+  for (const ExportDescription& known_format : kFormats) {
+    if (known_format.name == name) return known_format.format;
+    known += (known.empty() ? "" : ", ") + std::string(known_format.name);
   }
   return failure(ErrorCode::usage, fmt::format("unknown export format '{}'; known: {}", name, known), "--format");
 }
@@ -117,19 +142,18 @@ Status export_run(const std::string& run_folder, ExportFormat format, std::optio
                   const ThreadPool& workers, const std::string& path) {
   if (format == ExportFormat::geotiff) return export_whole_map(run_folder, MapFormat::geotiff, workers, path);
   if (format == ExportFormat::octomap) return export_whole_map(run_folder, MapFormat::octomap, workers, path);
+  if (format == ExportFormat::gltf) return export_whole_map(run_folder, MapFormat::gltf, workers, path);
+  if (format == ExportFormat::colmap)
+    return failure(ErrorCode::usage, "needs the images of the recording", "--format colmap", "name it by --recording");
   const RunFolder folder{run_folder};
   auto store = RunStore::open_read_only(folder.store());
   if (!store) return failure(store);
   if (format == ExportFormat::ply || format == ExportFormat::pcd) return export_terrain(folder, *store, format, path);
   const auto frames = store->frames();
   if (!frames) return failure(frames);
-  if (frames->empty()) return failure(ErrorCode::input, "contains no frames", folder.store());
-  if (kind && !has_trajectory(*frames, *kind)) {
-    return failure(ErrorCode::input, fmt::format("holds no {} trajectory", name_of(*kind)), folder.path,
-                   "run without --odometry-only");
-  }
-  const TrajectoryKind chosen = kind.value_or(best_of(*frames));
-  const auto text = trajectory_text(folder, format, chosen, *frames);
+  const auto chosen = exported_trajectory(folder, *frames, kind);
+  if (!chosen) return failure(chosen);
+  const auto text = trajectory_text(folder, format, *chosen, *frames);
   if (!text) return failure(text);
   return write_file_atomically(path, *text);
 }

@@ -16,6 +16,7 @@
 #include "spartan/reconstruction/rendering.h"
 #include "spartan/system/internal/map_description.h"
 #include "spartan/system/internal/map_grids.h"
+#include "spartan/system/internal/map_mesh.h"
 #include "spartan/system/internal/octomap_file.h"
 #include "spartan/system/map_files.h"
 
@@ -84,11 +85,12 @@ std::map<std::int32_t, Stamp> stamps_of(const GlobalMap& map) {
 }
 
 Result<MapFormat> map_format_of(const std::string& path) {
-  constexpr std::array<std::pair<std::string_view, MapFormat>, 7> kExtensions{{{".tif", MapFormat::geotiff},
+  constexpr std::array<std::pair<std::string_view, MapFormat>, 8> kExtensions{{{".tif", MapFormat::geotiff},
                                                                                {".png", MapFormat::figure},
                                                                                {".ply", MapFormat::ply},
                                                                                {".pcd", MapFormat::pcd},
                                                                                {".bt", MapFormat::octomap},
+                                                                               {".glb", MapFormat::gltf},
                                                                                {".asc", MapFormat::ascii_grid},
                                                                                {".yaml", MapFormat::occupancy_grid}}};
   const std::string extension = std::filesystem::path(path).extension().string();
@@ -96,7 +98,7 @@ Result<MapFormat> map_format_of(const std::string& path) {
     if (extension == name) return format;
   }
   return failure(ErrorCode::usage, "has an unknown extension", path,
-                 "known extensions: .tif, .png, .ply, .pcd, .bt, .asc, .yaml, .map");
+                 "known extensions: .tif, .png, .ply, .pcd, .bt, .glb, .asc, .yaml, .map");
 }
 
 Status export_map(const MapView& view, const MapExport& request, const ThreadPool& workers, const std::string& path) {
@@ -117,6 +119,8 @@ Status export_map(const MapView& view, const MapExport& request, const ThreadPoo
       const auto octree = octomap_file(view);
       return octree ? write_file_atomically(path, *octree) : Status(failure(octree));
     }
+    case MapFormat::gltf:
+      return write_file_atomically(path, glb_file(mesh_of(view, cell_colours(view, request.points))));
     case MapFormat::occupancy_grid:
       return write_occupancy_map(view, path);
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "spartan/core/result.h"
+#include "spartan/reconstruction/point_cloud.h"
 #include "spartan/reconstruction/stop_mapper.h"
 #include "spartan/slam/global_map.h"
 #include "spartan/system/run_options.h"
@@ -35,11 +36,11 @@ Status write_global_map(GlobalMap& map, const MapOptions& options, std::optional
 Status remove_map_files(const std::string& path);
 
 /// figure: elevation and classes with axes, scale and legend. ply, pcd: centres of cells. octomap: a binary OcTree.
-/// ascii_grid: one layer as an ESRI ASCII grid. occupancy_grid: the YAML file of map_server (ROS) and Nav2, with an
-/// image .pgm beside it.
-enum class MapFormat { geotiff, figure, ply, pcd, octomap, ascii_grid, occupancy_grid };
+/// gltf: a mesh of the surface (glTF 2.0, binary). ascii_grid: one layer as an ESRI ASCII grid. occupancy_grid: the YAML
+/// file of map_server (ROS) and Nav2, with an image .pgm beside it.
+enum class MapFormat { geotiff, figure, ply, pcd, octomap, gltf, ascii_grid, occupancy_grid };
 
-/// By the extension: .tif, .png, .ply, .pcd, .bt, .asc or .yaml. Code `usage` for others.
+/// By the extension: .tif, .png, .ply, .pcd, .bt, .glb, .asc or .yaml. Code `usage` for others.
 Result<MapFormat> map_format_of(const std::string& path);
 
 /// What export_map() writes.
@@ -48,6 +49,7 @@ struct MapExport {
   std::vector<std::string> layers = {};  ///< names of the bands of a GeoTIFF or grid; empty: all, or elevation_m
   MapOptions options = {};               ///< of the slopes and costs
   MapContext about = {};
+  PointCloud points = {};  ///< of the ground, world frame: colours of a mesh; without them it is coloured by elevation
 };
 
 /// The stops of a global map as MapContext has them.
@@ -74,12 +76,15 @@ class SavedMap {
   const RunOptions& options() const { return options_; }
   /// The stops of the map, and where its x axis points if the run has stated it.
   MapContext about() const;
+  /// The point clouds of the run, in the colours of its images. Empty: a map file, or a run without them. Code `input`.
+  Result<PointCloud> points() const;
 
  private:
   explicit SavedMap(RunOptions options) : options_(std::move(options)) {}
   static Result<SavedMap> open_run(const std::string& path);
 
   RunOptions options_;
+  std::string terrain_folder_;  // of a run
   std::optional<bool> x_is_east_;
   std::unique_ptr<MapFile> file_;
   std::unique_ptr<RunStore> run_store_;

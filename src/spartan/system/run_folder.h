@@ -3,10 +3,12 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "spartan/camera/recording.h"
 #include "spartan/core/files.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
@@ -88,17 +90,32 @@ Result<ReplacedFolder> replace_run_folder(const RunFolder& folder);
 /// Removes the folder of a run that failed without any result.
 void remove_run_folder(const RunFolder& folder);
 
-enum class ExportFormat { tum, kitti, euroc, csv, geotiff, octomap, ply, pcd };
+enum class ExportFormat { tum, kitti, euroc, csv, colmap, geotiff, gltf, octomap, ply, pcd };
+
+struct ExportDescription {
+  std::string_view name;  ///< as on the command line
+  ExportFormat format;
+  std::string_view extension;  ///< of the file; "folder": a folder
+  std::string_view content;
+};
+std::span<const ExportDescription> export_descriptions();
 
 /// Code `usage` for an unknown name.
 Result<ExportFormat> parse_export_format(std::string_view name);
 
 /// tum, euroc: world_from_body of every measured pose. kitti: first left optical frame from left optical frame, one
 /// line for every listed frame; a frame without a pose has the predicted one. csv: every frame with status, pose and
-/// standard deviations (empty without a pose). geotiff, octomap: the global map. ply, pcd: all terrain point clouds in
-/// one file. `kind` selects the trajectory; none: the best that the run has. Codes: `input` (no run, or a run without
-/// the requested result), `output`.
+/// standard deviations (empty without a pose). geotiff, gltf, octomap: the global map. ply, pcd: all terrain point clouds
+/// in one file. `kind` selects the trajectory; none: the best that the run has. Codes: `input` (no run, or a run without
+/// the requested result), `output`, `usage` (colmap).
 Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
                   const ThreadPool& workers, const std::string& path);
+
+/// Writes the folder of a COLMAP project: images/left/<stamp_ns>.png and images/right/<stamp_ns>.png, rectified, of each
+/// measured pose, and sparse/0 with cameras.txt (two PINHOLE cameras), images.txt (poses, camera from world) and
+/// points3D.txt (terrain points without tracks, at most 200 000). `recording`: the one that was run, with its images.
+/// Returns the number of images. Codes: `input` (no run, no such trajectory, a frame that the recording lacks), `output`.
+Result<int> export_colmap(const std::string& run_folder, Recording& recording, std::optional<TrajectoryKind> kind,
+                          const ThreadPool& workers, const std::string& path);
 
 }  // namespace spartan

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "spartan/core/files.h"
+#include "spartan/system/internal/terrain_files.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 
@@ -26,6 +27,13 @@ MapContext SavedMap::about() const {
   return {x_is_east_, stamps_of(file_ ? file_->map() : *run_map_)};
 }
 
+Result<PointCloud> SavedMap::points() const {
+  if (!run_store_) return PointCloud();
+  const auto terrain = run_store_->terrain();
+  if (!terrain) return failure(terrain);
+  return terrain->empty() ? PointCloud() : internal::terrain_cloud(terrain_folder_, *terrain);
+}
+
 Result<SavedMap> SavedMap::open_run(const std::string& path) {
   const RunFolder folder{path};
   auto store = RunStore::open_read_only(folder.store());
@@ -35,6 +43,7 @@ Result<SavedMap> SavedMap::open_run(const std::string& path) {
   const auto rig = read_rig_yaml(folder.rig());
   if (!rig) return failure(rig);
   SavedMap saved(resolved_options(std::move(*options), *rig));
+  saved.terrain_folder_ = folder.terrain();
   saved.x_is_east_ = x_is_east(folder);
   saved.run_store_ = std::make_unique<RunStore>(std::move(*store));
   auto map =
