@@ -17,7 +17,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="spartan-bag", description="Bags of ROS 1 and ROS 2, in and out.")
     commands = parser.add_subparsers(dest="command", required=True)
     read = commands.add_parser("import", help="a bag becomes a recording for `spartan run`")
-    read.add_argument("bag", help="file of ROS 1, folder of ROS 2")
+    read.add_argument("bag", help="file of ROS 1, folder of ROS 2, or MCAP file with Foxglove's schemas")
     read.add_argument("-o", "--output", required=True, help="folder of the recording to create")
     for option, what in (("--left", "of the left images"), ("--right", "of the right images"),
                          ("--imu", "of sensor_msgs/Imu"), ("--wheels", "of nav_msgs/Odometry by the wheels")):
@@ -27,9 +27,26 @@ def _parser() -> argparse.ArgumentParser:
                       help="largest difference of the stamps of the images of a frame (default 0.005)")
     write = commands.add_parser("export", help="a recording or the results of a run become a bag")
     write.add_argument("input", help="folder of a recording, or a run folder")
-    write.add_argument("-o", "--output", required=True, help="bag to create: a name with .bag is of ROS 1, else of ROS 2")
+    write.add_argument("-o", "--output", required=True, help="bag to create: of ROS 1 (a name with .bag), ROS 2 (any other name), an MCAP file with Foxglove's "
+                            "schemas (.mcap), or, of a run, a recording of Rerun (.rrd)")
     write.add_argument("--storage", choices=("sqlite3", "mcap"), default="sqlite3", help="of ROS 2 (default sqlite3)")
+    write.add_argument("--recording", help="of a run: its recording, whose images go into the .rrd file (default: none)")
     return parser
+
+
+def _export(arguments: argparse.Namespace) -> None:
+    from spartan import bags
+
+    is_run = (Path(arguments.input) / "run.sqlite").exists()
+    if Path(arguments.output).suffix == ".rrd":
+        if not is_run:
+            raise Error("usage", "is not a run: only runs become recordings of Rerun", arguments.input)
+        bags.export_rerun(arguments.input, arguments.output, recording=arguments.recording)
+    elif is_run:
+        bags.export_run(arguments.input, arguments.output, storage=arguments.storage)
+    else:
+        frames = bags.export_recording(arguments.input, arguments.output, storage=arguments.storage)
+        print(f"{frames} frames")
 
 
 def main() -> None:
@@ -45,11 +62,10 @@ def main() -> None:
                 wheels=arguments.wheels, rig=arguments.rig, pair_tolerance_s=arguments.pair_tolerance)
             print(f"{counts['frames']} frames, {counts['samples']} samples of sensors, {counts['unpaired']} images without "
                   f"a partner, {counts['rejected']} rejected; next: spartan run {arguments.output} -o RUN")
-        elif (Path(arguments.input) / "run.sqlite").exists():
-            bags.export_run(arguments.input, arguments.output, storage=arguments.storage)
         else:
-            frames = bags.export_recording(arguments.input, arguments.output, storage=arguments.storage)
-            print(f"{frames} frames")
+            _export(arguments)
+    except ImportError as error:
+        sys.exit(f"error: {error} (pip install 'spartan[bags,rerun]')")
     except Error as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(_EXIT_CODES.get(error.code, 1))

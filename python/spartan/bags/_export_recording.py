@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from spartan import _core
-from spartan.bags._writer import BagWriter
+from spartan.bags._writer import MessageWriter, open_writer
 
 DESCRIPTION_TOPIC = "/spartan/recording"
 _ENCODINGS = {"gray": ("mono8", "mono16"), "rgb": ("rgb8", "rgb16"), "bayer_rggb": ("bayer_rggb8", "bayer_rggb16"),
@@ -29,7 +29,7 @@ def _description(recording: _core.Recording) -> str:
                        "rig": recording.rig.to_yaml()})
 
 
-def _camera_info(bag: BagWriter, rig: _core.Rig, pair: _core.StereoPair, side: str, stamp_ns: int) -> Any:
+def _camera_info(bag: MessageWriter, rig: _core.Rig, pair: _core.StereoPair, side: str, stamp_ns: int) -> Any:
     """Intrinsics and, of a pair that is rectified already, the projection with its baseline. Lens models that
     camera_info does not know are left to the rig in DESCRIPTION_TOPIC."""
     camera = rig.camera(getattr(pair, side))
@@ -58,7 +58,7 @@ def _camera_info(bag: BagWriter, rig: _core.Rig, pair: _core.StereoPair, side: s
                          roi=region, **dict(zip(keys, matrices)))
 
 
-def _write_frame(bag: BagWriter, rig: _core.Rig, frame: _core.StereoFrame) -> None:
+def _write_frame(bag: MessageWriter, rig: _core.Rig, frame: _core.StereoFrame) -> None:
     pair, messages = rig.pair(frame.pair), bag.messages
     for side, stamp, pixels in (("left", frame.stamp_ns, frame.left), ("right", frame.right_stamp_ns, frame.right)):
         camera = rig.camera(getattr(pair, side))
@@ -81,7 +81,7 @@ def _write_frame(bag: BagWriter, rig: _core.Rig, frame: _core.StereoFrame) -> No
         bag.write("/tf", frame.stamp_ns, messages.transforms(moved))
 
 
-def _write_sample(bag: BagWriter, sample: Any) -> None:
+def _write_sample(bag: MessageWriter, sample: Any) -> None:
     messages, stamp = bag.messages, sample.stamp_ns
     header = messages.header(stamp, "base_link")
     if isinstance(sample, _core.ImuSample):
@@ -106,7 +106,8 @@ def export_recording(
     recording: str | os.PathLike[str], bag: str | os.PathLike[str], *, rig: str | os.PathLike[str] | None = None,
     storage: str = "sqlite3"
 ) -> int:
-    """Writes a recording as a bag of ROS 1 (`bag` ends with .bag) or ROS 2 (a folder). Returns the number of frames.
+    """Writes a recording as a bag of ROS 1 (`bag` ends with .bag) or ROS 2 (a folder), or as an
+    MCAP file with Foxglove's schemas (.mcap). Returns the number of frames.
 
     Images are `/<pair>/left/image_raw` and `right`, with `camera_info`; the IMU is `/imu` in `base_link`. Wheels, compass,
     inclinometer, and pan, tilt and stop of a frame are JointState messages. `/tf_static` has the cameras that are fixed to
@@ -114,7 +115,7 @@ def export_recording(
     """
     opened = _core.open_recording(recording, rig=rig)
     frames = 0
-    with BagWriter(bag, storage) as out:
+    with open_writer(bag, storage) as out:
         begun = False
         for sample in opened:
             if isinstance(sample, _core.MissingFrame):

@@ -13,7 +13,7 @@ from spartan._errors import Error
 from spartan._run import Run
 from spartan.bags._export_recording import optical_frame
 from spartan.bags._messages import Messages, world_covariance
-from spartan.bags._writer import BagWriter
+from spartan.bags._writer import MessageWriter, open_writer
 
 
 def _with_covariance(messages: Messages, pose: _core.UncertainPose) -> Any:
@@ -95,14 +95,14 @@ def _occupancy(messages: Messages, stamp_ns: int, view: _core.MapView) -> Any:
                          data=percent.reshape(-1).copy())
 
 
-def _best(record: _core.FrameRecord) -> _core.UncertainPose | None:
+def best_pose(record: _core.FrameRecord) -> _core.UncertainPose | None:
     return record.localization or record.slam or (record.odometry if record.has_pose else None)
 
 
-def _write_poses(out: BagWriter, run: Run) -> None:
+def _write_poses(out: MessageWriter, run: Run) -> None:
     messages, path = out.messages, []
     for record in run.frames:
-        best, stamp = _best(record), record.stamp_ns
+        best, stamp = best_pose(record), record.stamp_ns
         if best is None:
             continue
         if record.has_pose:
@@ -121,12 +121,12 @@ def _write_poses(out: BagWriter, run: Run) -> None:
         out.write("/spartan/path", end, message, latched=True)
 
 
-def _write_terrain(out: BagWriter, run: Run) -> None:
+def _write_terrain(out: MessageWriter, run: Run) -> None:
     imager = _core.Imager(run.rig, run.options.imaging, threads=1, mask_folder=run.path)
     records, files = {record.stamp_ns: record for record in run.frames}, run.path / "terrain"
     for stamp in run.terrain_stamps_ns:
         record = records[stamp]
-        best = _best(record)
+        best = best_pose(record)
         if best is None or not (files / f"{stamp}.pfm").exists():  # the disk was full
             continue
         values = _core.read_disparity(files / f"{stamp}.pfm")
@@ -137,7 +137,8 @@ def _write_terrain(out: BagWriter, run: Run) -> None:
 
 
 def export_run(run: Run | str | os.PathLike[str], bag: str | os.PathLike[str], *, storage: str = "sqlite3") -> None:
-    """Writes the results of a run as a bag of ROS 1 (`bag` ends with .bag) or ROS 2 (a folder).
+    """Writes the results of a run as a bag of ROS 1 (`bag` ends with .bag) or ROS 2 (a folder), or as an
+    MCAP file with Foxglove's schemas (.mcap).
 
     `/spartan/odometry` (vision alone, in `odom`), `/spartan/pose` and `/spartan/path` (the best trajectory, in `map`), `/tf`
     (`map` to `odom` to `base_link`), `/tf_static` (cameras on the body), `/<pair>/disparity`, `/spartan/terrain` (points in
@@ -146,7 +147,7 @@ def export_run(run: Run | str | os.PathLike[str], bag: str | os.PathLike[str], *
     opened = run if isinstance(run, Run) else Run(run)
     if not opened.frames:
         raise Error("input", "has no frames", str(opened.path))
-    with BagWriter(bag, storage) as out:
+    with open_writer(bag, storage) as out:
         messages, start, end = out.messages, opened.frames[0].stamp_ns, opened.frames[-1].stamp_ns
         rig = opened.rig
         fixed = [messages.transform(start, "base_link", optical_frame(pair.name, side),

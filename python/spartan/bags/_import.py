@@ -153,6 +153,16 @@ class _Bag:
         return next(iter(self.messages({topic})), (topic, None))[1]
 
 
+def _opened(path: str | os.PathLike[str]) -> Any:
+    """A bag, or an MCAP file with Foxglove's schemas, which gives the same messages."""
+    if Path(path).suffix == ".mcap" and Path(path).is_file():
+        from spartan.bags._foxglove import FoxgloveFile, is_foxglove_file
+
+        if is_foxglove_file(path):
+            return FoxgloveFile(path)
+    return _Bag(path)
+
+
 def _of_type(types: dict[str, str], *kinds: str, word: str = "") -> str | None:
     found = sorted(topic for topic, kind in types.items() if kind in kinds and word in topic)
     return found[0] if found else None
@@ -371,7 +381,7 @@ def import_bag(
     `/tf_static`. `wheels` may be a topic of nav_msgs/Odometry. Returns counts: `frames`, `unpaired` images, `samples` of
     sensors, and `rejected` ones whose stamps do not increase. Raises Error.
     """
-    opened = _Bag(bag)
+    opened: _Bag = _opened(bag)
     try:
         text = None
         if DESCRIPTION_TOPIC in opened.types() and left is None and right is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Writer as Writer1
@@ -14,6 +14,27 @@ from rosbags.rosbag2 import Writer as Writer2
 
 from spartan._errors import Error
 from spartan.bags._messages import Messages
+
+
+class MessageWriter(Protocol):
+    """Writes messages of ROS, which `messages` makes."""
+
+    messages: Messages
+
+    def write(self, topic: str, stamp_ns: int, message: Any, *, latched: bool = False) -> None: ...
+    def __enter__(self) -> Self: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+
+def open_writer(path: str | os.PathLike[str], storage: str = "sqlite3") -> MessageWriter:
+    """By the name: `.bag` is a bag of ROS 1, `.mcap` a file with Foxglove's schemas, others are bags of ROS 2."""
+    if Path(path).suffix == ".mcap":
+        from spartan.bags._foxglove import FoxgloveWriter
+
+        return FoxgloveWriter(path)
+    return BagWriter(path, storage)
 
 
 class BagWriter:

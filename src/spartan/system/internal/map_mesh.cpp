@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <type_traits>
 
 #include "spartan/reconstruction/rendering.h"
 
@@ -66,7 +65,7 @@ class Buffer {
   // Elements of four bytes, or of a multiple; the parts stay aligned.
   template <class Element>
   nlohmann::json add(const std::vector<Element>& elements, int target) {
-    static_assert(std::is_trivially_copyable_v<Element> && sizeof(Element) % 4 == 0);
+    static_assert(sizeof(Element) % 4 == 0);
     const std::size_t offset = bytes_.size(), length = elements.size() * sizeof(Element);
     bytes_.append(reinterpret_cast<const char*>(elements.data()), length);
     return {{"buffer", 0}, {"byteOffset", offset}, {"byteLength", length}, {"target", target}};
