@@ -3,7 +3,8 @@
 
     map_formats_test.py PROGRAM SMALL_RUNS   SMALL_RUNS: the folder that make_small_runs has filled
 
-GeoTIFF, ASCII grid and PGM: rasterio and gdalinfo; PLY: plyfile; PCD: pypcd4; OctoMap: octomap-python (./setup test).
+GeoTIFF, ASCII grid and PGM: rasterio and gdalinfo; PLY: plyfile; PCD: pypcd4; OctoMap: octomap-python; glTF: trimesh;
+COLMAP: pycolmap (./setup test).
 Open3D and PCL open the point clouds as well where they are installed (./setup viewers).
 Exit code 77 (skipped) without the Python packages, or where the program was built without the simulator.
 """
@@ -19,9 +20,12 @@ VENV_PYTHON = Path(__file__).resolve().parent.parent / ".venv/bin/python3"  # ma
 try:
     import numpy as np
     import octomap
+    import PIL.Image
     import plyfile
+    import pycolmap
     import pypcd4
     import rasterio
+    import trimesh
 except ImportError as missing:
     if VENV_PYTHON.exists() and Path(sys.prefix) != VENV_PYTHON.parent.parent:
         os.execv(VENV_PYTHON, [str(VENV_PYTHON), *sys.argv])
@@ -60,6 +64,84 @@ def gdalinfo(path):
     return subprocess.run(["gdalinfo", str(path)], check=True, capture_output=True, text=True, timeout=60).stdout
 
 
+def check_statistics(dataset, bands):
+    """Of each band, over its known cells."""
+    for number, (name, values) in enumerate(bands.items(), 1):
+        known = values[np.isfinite(values)].astype(float)
+        tags = {key: float(value) for key, value in dataset.tags(number).items() if key.startswith("STATISTICS_")}
+        expected = {"MINIMUM": known.min(), "MAXIMUM": known.max(), "MEAN": known.mean(), "STDDEV": known.std()}
+        for key, value in expected.items():
+            check(math.isclose(tags["STATISTICS_" + key], value, rel_tol=1e-6, abs_tol=1e-9), f"{key} of {name}: {tags}")
+        share = 100 * len(known) / values.size
+        check(math.isclose(tags["STATISTICS_VALID_PERCENT"], share, rel_tol=1e-3), f"share of known cells of {name}")
+
+
+def check_mesh(exports, bands, transform):
+    """The mesh in glTF's axes (x right, y up, z towards the viewer): the cells of the map, counter-clockwise from above."""
+    scene = trimesh.load(exports.map("site.glb"))
+    mesh = scene.to_mesh()
+    rows, columns = np.nonzero(bands["count"] > 0)
+    centres = np.stack([transform.c + transform.a * (columns + 0.5), bands["elevation_m"][rows, columns],
+                        -(transform.f + transform.e * (rows + 0.5))], axis=-1)
+    check(len(mesh.vertices) == len(rows), f"{len(mesh.vertices)} vertices of {len(rows)} cells")
+    check(np.allclose(mesh.vertices, centres, atol=1e-5), "a vertex at the centre of each known cell")
+    check((mesh.face_normals[:, 1] > 0).all(), "triangles face upwards")
+    known = bands["count"] > 0
+    corners = known[:-1, :-1].astype(int) + known[1:, :-1] + known[:-1, 1:] + known[1:, 1:]
+    check(len(mesh.faces) == 2 * (corners == 4).sum() + (corners == 3).sum(), "triangles between neighbours")
+    check(len(exports.of_run("run.glb", "gltf").read_bytes()) == len((exports.folder / "site.glb").read_bytes()), "export --format gltf")
+
+
+def check_colours_of_mesh(exports):
+    """Cells that hold points of a gray image have the mean of their levels, in linear light."""
+    scene = trimesh.load(exports.of_run("coloured.glb", "gltf"))
+    colours = next(iter(scene.geometry.values())).visual.vertex_attributes["color"].astype(float) / 65535
+    check((colours[:, 3] == 1).all(), "colours are opaque")
+    vertices = scene.to_mesh().vertices
+    with rasterio.open(exports.map("place.tif")) as site:
+        cell = site.transform.a
+    terrain = plyfile.PlyData.read(exports.of_run("points.ply", "ply"))["vertex"]
+    levels = {}
+    for x, y, level in zip(terrain["x"], terrain["y"], terrain["red"]):
+        levels.setdefault((math.floor(x / cell), math.floor(y / cell)), []).append(int(level))
+    compared = 0
+    for (x, _, z), colour in zip(vertices, colours):
+        here = levels.get((math.floor(x / cell), math.floor(-z / cell)))
+        if here is None:
+            continue
+        level = sum(here) // len(here) / 255
+        linear = level / 12.92 if level <= 0.04045 else ((level + 0.055) / 1.055) ** 2.4
+        compared += 1
+        check(np.allclose(colour[:3], linear, atol=2e-4), f"colour of the cell at {x}, {-z}: {colour}, not {linear}")
+    check(compared > 500, f"{compared} cells have points")
+
+
+def check_colmap(exports, recording):
+    """pycolmap reads the model; its cameras see each terrain point where it was seen: in the gray level that it has."""
+    exports.spartan("export", exports.run, "--format", "colmap", "-o", exports.folder / "colmap", "--recording", recording)
+    model = pycolmap.Reconstruction(exports.folder / "colmap/sparse/0")
+    check(len(model.cameras) == 2 and len(model.images) > 4, f"{len(model.cameras)} cameras, {len(model.images)} images")
+    tried = 0
+    for image in model.images.values():
+        stamp = Path(image.name).stem
+        cloud = exports.run / f"terrain/{stamp}.ply"
+        if not cloud.exists() or not image.name.startswith("left/"):
+            continue
+        vertices = plyfile.PlyData.read(cloud)["vertex"]
+        points = np.stack([vertices["x"], vertices["y"], vertices["z"]], axis=-1).astype(float)
+        with PIL.Image.open(exports.folder / "colmap/images" / image.name) as file:
+            pixels = np.array(file)
+        in_camera = image.cam_from_world() * points
+        seen = np.floor(model.cameras[image.camera_id].img_from_cam(in_camera)).astype(int)
+        check((in_camera[:, 2] > 0).all() and (seen >= 0).all() and (seen < pixels.shape[::-1]).all(), "points are seen")
+        # The point clouds are those of the odometry's or the localization's pose, which is that of the model.
+        off = np.abs(pixels[seen[:, 1], seen[:, 0]].astype(int) - vertices["red"])
+        check(np.median(off) <= 1, f"gray levels of the points in {image.name}: off by {np.median(off)}")
+        tried += 1
+    check(tried > 1, f"{tried} terrain views")
+    check(len(model.points3D) > 1000, f"{len(model.points3D)} points")
+
+
 def check_geotiff(exports):
     """Returns the bands by name and the transform."""
     path = exports.map("site.tif")
@@ -72,12 +154,17 @@ def check_geotiff(exports):
         check(tags["X_AXIS"] in ("east", "start_heading"), f"X_AXIS in {tags}")
         check(0 <= int(tags["FIRST_STAMP_NS"]) <= int(tags["LAST_STAMP_NS"]) and int(tags["STOPS"]) > 1, f"stops: {tags}")
         bands, transform = dict(zip(LAYERS, site.read())), site.transform
+        check_statistics(site, bands)
     text = gdalinfo(path)
+    check("LAYOUT=COG" in text, "a cloud-optimized GeoTIFF")
     check('LENGTHUNIT["metre",1' in text, "the CRS is in metres")
     check("Categories:" in text and all(f"{i}: {name}" in text for i, name in enumerate(CATEGORIES)), "names of classes")
     check("Overviews" not in text, "a small map has no overviews")
     with rasterio.open(exports.map("large.tif", "--window=-6,-6,6,6")) as large:
         check(large.overviews(1) == [2, 4], f"overviews {large.overviews(1)} of {large.width} cells")
+        check(large.block_shapes[0] == (512, 512), f"tiles {large.block_shapes[0]}")
+        check(large.tags(ns="IMAGE_STRUCTURE")["LAYOUT"] == "COG", "a large map is cloud-optimized")
+        check_statistics(large, dict(zip(LAYERS, large.read())))
     local = sorted((exports.run / "maps").glob("local_*.tif"))[0]
     with rasterio.open(local) as stop:
         check(stop.tags()["FIRST_STAMP_NS"] == local.stem.removeprefix("local_"), "the stamp of a local map")
@@ -197,6 +284,10 @@ def main():
         check_grids(exports, bands, transform)
         check_clouds(exports, bands, transform)
         check_octomap(exports, bands, transform)
+        check_mesh(exports, bands, transform)
+        drive = Exports(program, small_runs / "drive_run", Path(folder))
+        check_colours_of_mesh(drive)
+        check_colmap(drive, small_runs / "drive")
         check_viewers(exports)
     return 0
 
