@@ -16,6 +16,7 @@ from rosbags.typesys import Stores, get_typestore  # noqa: E402
 from spartan.bags import _import  # noqa: E402
 
 KINDS = [("drive.bag", "sqlite3"), ("drive", "sqlite3"), ("drive", "mcap")]
+IN_AND_OUT = [*KINDS, ("drive.mcap", "foxglove")]
 TRAJECTORIES = [f"trajectory_{kind}.tum" for kind in ("odometry", "slam", "localization", "smoothed")]
 
 
@@ -25,7 +26,7 @@ def read(path):
         return [(c.topic, c.msgtype, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
 
 
-@pytest.mark.parametrize("name, storage", KINDS)
+@pytest.mark.parametrize("name, storage", IN_AND_OUT)
 @pytest.mark.parametrize("which", ["drive", "stops"])
 def test_a_recording_goes_through_a_bag(small_runs, drive, stops, tmp_path, which, name, storage):
     folder = drive if which == "drive" else stops

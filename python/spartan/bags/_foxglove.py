@@ -311,7 +311,7 @@ class FoxgloveFile:
         wanted = sorted(topics & set(self._types))
         try:
             with self.path.open("rb") as file:
-                for schema, channel, message in make_reader(file).iter_messages(topics=wanted) if wanted else ():
+                for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages(topics=wanted) if wanted else ():
                     name = schema.name if schema is not None else ""
                     if name in _JSON_TYPES:
                         yield channel.topic, _from_json(name, message.data)
