@@ -56,14 +56,10 @@ std::unique_ptr<MapViewValue> make_view(MapValue& map, const std::optional<Windo
 void export_to(MapValue& map, const PathText& path, const std::optional<Window>& wanted,
                const std::vector<std::string>& layers) {
   check(map.use([&](SavedMap& saved) -> Status {
-    MapExport request;
     const auto format = map_format_of(path);
     if (!format) return failure(format);
-    request.format = *format;
-    request.layers = layers;
-    request.options = saved.options().mapping.map;
-    request.about = saved.about();
-    return export_map(view_of(saved, wanted), request, ThreadPool(1), path);
+    const auto request = saved.request(*format, layers);
+    return request ? export_map(view_of(saved, wanted), *request, ThreadPool(1), path) : Status(failure(request));
   }));
 }
 
@@ -122,8 +118,8 @@ void bind_global_maps(nb::module_& m) {
           "x_m"_a, "y_m"_a, "The map at a position, interpolated; None where it is not known.")
       .def("export", export_to, "path"_a, "extent"_a = nb::none(), nb::kw_only(),
            "layers"_a = std::vector<std::string>(),
-           "Writes a rectangle in the format of the extension: .tif (GeoTIFF), .png, .ply, .pcd, .bt (OctoMap), .asc "
-           "or .yaml "
+           "Writes a rectangle in the format of the extension: .tif (GeoTIFF), .png, .ply, .pcd, .bt (OctoMap), .glb "
+           "(glTF mesh), .asc or .yaml "
            "(occupancy grid). `layers`: of a GeoTIFF or grid.")
       .def("__repr__", [](MapValue& map) {
         const auto [stops, tiles] =

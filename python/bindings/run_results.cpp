@@ -77,11 +77,16 @@ nb::ndarray<nb::numpy, double, nb::shape<-1, 6, 6>> covariances(const RunResults
 }
 
 void export_to(const RunResults& run, const std::string& format, const PathText& path,
-               const std::optional<std::string>& trajectory, std::optional<int> threads) {
+               const std::optional<std::string>& trajectory, std::optional<int> threads,
+               const std::optional<PathText>& recording) {
   const ExportFormat chosen = value_of(parse_export_format(format));
   const std::optional<TrajectoryKind> kind = trajectory ? std::optional(kind_of(run, trajectory)) : std::nullopt;
   const ThreadPool workers = thread_pool(threads);
   const nb::gil_scoped_release free;
+  if (chosen == ExportFormat::colmap && recording) {
+    const auto opened = value_of(open_recording(*recording));
+    return static_cast<void>(value_of(export_colmap(run.folder.path, *opened, kind, workers, path)));
+  }
   check(export_run(run.folder.path, chosen, kind, workers, path));
 }
 
@@ -168,7 +173,8 @@ void bind_run_results(nb::module_& m) {
           },
           "kind"_a = nb::none())
       .def("covariances", covariances, "kind"_a = nb::none())
-      .def("export", export_to, "format"_a, "path"_a, "trajectory"_a = nb::none(), "threads"_a = nb::none());
+      .def("export", export_to, "format"_a, "path"_a, "trajectory"_a = nb::none(), "threads"_a = nb::none(),
+           "recording"_a = nb::none());
 }
 
 }  // namespace spartan::python

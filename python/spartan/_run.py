@@ -81,10 +81,18 @@ class Run:
         files = [folder / f"{stamp}.ply" for stamp in self.terrain_stamps_ns]
         return [_core.PointCloud.load(str(file)) for file in files if file.exists()]
 
-    def export(self, format: str, path: StrPath, *, trajectory: str | None = None, threads: int | None = None) -> None:
-        """Writes the run as `tum`, `kitti`, `euroc`, `csv` (trajectory), `geotiff`, `octomap` (map), `ply` or `pcd`
-        (terrain)."""
-        self._results.export(format, path, trajectory, threads)
+    def export(
+        self,
+        format: str,
+        path: StrPath,
+        *,
+        trajectory: str | None = None,
+        threads: int | None = None,
+        recording: StrPath | None = None,
+    ) -> None:
+        """Writes the run as `tum`, `kitti`, `euroc`, `csv` (trajectory), `colmap` (folder with rectified images and poses;
+        `recording`: the one that was run), `geotiff`, `gltf`, `octomap` (map), `ply` or `pcd` (terrain)."""
+        self._results.export(format, path, trajectory, threads, recording)
 
     def __repr__(self) -> str:
         return f"<Run '{self._results.path}': {len(self.frames)} frames>"

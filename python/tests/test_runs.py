@@ -225,6 +225,8 @@ def test_a_map_is_exported(stops_run, tmp_path):
         assert np.array_equal(file.read(1), world.view()["elevation_m"], equal_nan=True)
     with pytest.raises(spartan.Error):
         world.export(str(tmp_path / "map.xyz"))
+    world.export(tmp_path / "map.glb")
+    assert (tmp_path / "map.glb").read_bytes()[:4] == b"glTF"
     stops_run.export("tum", tmp_path / "poses.tum")
     assert len(spartan.Trajectory.load(str(tmp_path / "poses.tum"))) == len(stops_run.trajectory())
 

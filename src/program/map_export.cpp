@@ -5,7 +5,6 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <utility>
 #include <vector>
 
 #include "program/map.h"
@@ -67,10 +66,8 @@ Status write_map(SavedMap& saved, const MapExportArguments& a, const Context& co
   const auto view = saved.map().view(*window);
   if (!view) return failure(view);
   if (!knows_a_cell(*view)) context.log.warning("--window: no cell of it is known");
-  auto points = *format == MapFormat::gltf ? saved.points() : Result<PointCloud>();
-  if (!points) return failure(points);
-  return export_map(*view, {*format, a.layers, saved.options().mapping.map, saved.about(), std::move(*points)},
-                    ThreadPool(context.threads), a.output);
+  const auto request = saved.request(*format, a.layers);
+  return request ? export_map(*view, *request, ThreadPool(context.threads), a.output) : Status(failure(request));
 }
 
 Result<ExitCode> export_command(const Context& context, const MapExportArguments& a) {

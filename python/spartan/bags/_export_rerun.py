@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from pathlib import Path
 from typing import Any
@@ -97,8 +98,7 @@ def export_rerun(
 
     Needs `pip install spartan[rerun]`. Raises Error; ImportError without Rerun.
     """
-    import rerun as rr
-
+    rr: Any = importlib.import_module("rerun")
     opened = run if isinstance(run, Run) else Run(run)
     if not opened.frames:
         raise Error("input", "has no frames", str(opened.path))
@@ -106,7 +106,7 @@ def export_rerun(
         raise Error("output", "exists", str(path), "choose another name")
     source = None if recording is None else _core.open_recording(recording)
     out = rr.RecordingStream("spartan", recording_id=opened.path.name)
-    out.save(path)
+    out.save(Path(path))
     out.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     _log_trajectories(rr, out, opened)
     _log_map(rr, out, opened)

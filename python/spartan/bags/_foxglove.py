@@ -191,7 +191,7 @@ class FoxgloveWriter:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._writer.finish()
+        self._writer.finish()  # type: ignore[no-untyped-call]
         self._file.close()
 
     def write(self, topic: str, stamp_ns: int, message: Any, *, latched: bool = False) -> None:

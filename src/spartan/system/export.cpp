@@ -99,10 +99,8 @@ Status export_whole_map(const std::string& run_folder, MapFormat format, const T
   if (!saved) return failure(saved);
   const auto view = saved->map().view(saved->map().extent());
   if (!view) return failure(view);
-  auto points = format == MapFormat::gltf ? saved->points() : Result<PointCloud>();
-  if (!points) return failure(points);
-  return export_map(*view, {format, {}, saved->options().mapping.map, saved->about(), std::move(*points)}, workers,
-                    path);
+  const auto request = saved->request(format);
+  return request ? export_map(*view, *request, workers, path) : Status(failure(request));
 }
 
 Status export_terrain(const RunFolder& folder, RunStore& store, ExportFormat format, const std::string& path) {

@@ -76,12 +76,14 @@ class SavedMap {
   const RunOptions& options() const { return options_; }
   /// The stops of the map, and where its x axis points if the run has stated it.
   MapContext about() const;
-  /// The point clouds of the run, in the colours of its images. Empty: a map file, or a run without them. Code `input`.
-  Result<PointCloud> points() const;
+  /// To export a part of it, with the options of the run. Code `input` (a damaged point cloud, for meshes).
+  Result<MapExport> request(MapFormat format, std::vector<std::string> layers = {}) const;
 
  private:
   explicit SavedMap(RunOptions options) : options_(std::move(options)) {}
   static Result<SavedMap> open_run(const std::string& path);
+  // The point clouds of the run, in the colours of its images. Empty: a map file, or a run without them.
+  Result<PointCloud> points() const;
 
   RunOptions options_;
   std::string terrain_folder_;  // of a run

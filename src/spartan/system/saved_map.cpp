@@ -34,6 +34,12 @@ Result<PointCloud> SavedMap::points() const {
   return terrain->empty() ? PointCloud() : internal::terrain_cloud(terrain_folder_, *terrain);
 }
 
+Result<MapExport> SavedMap::request(MapFormat format, std::vector<std::string> layers) const {
+  auto coloured = format == MapFormat::gltf ? points() : Result<PointCloud>();
+  if (!coloured) return failure(coloured);
+  return MapExport{format, std::move(layers), options_.mapping.map, about(), std::move(*coloured)};
+}
+
 Result<SavedMap> SavedMap::open_run(const std::string& path) {
   const RunFolder folder{path};
   auto store = RunStore::open_read_only(folder.store());
