@@ -38,7 +38,8 @@ MAY_INCLUDE = {
     "testing": BASE | {"rig", "calibration_io", "camera"},
     "system": SYSTEM | {"figures", "calibration"},
     "report": SYSTEM | {"figures", "calibration", "rig_design", "eval", "system"},
-    "program": ALL,
+    "viewer": ALL,
+    "program": ALL | {"viewer"},
     "python": ALL,
     "tests": ALL | {"figures", "testing"},
 }
@@ -72,7 +73,7 @@ def module_of(path, project):
         return parts[2]
     if parts[:2] == ("python", "bindings"):
         return "python"
-    return "program" if parts[:2] == ("src", "program") else "tests"
+    return parts[1] if parts[:2] in (("src", "program"), ("src", "viewer")) else "tests"
 
 
 def component_of(parts):

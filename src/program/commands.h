@@ -15,6 +15,7 @@ void add_record(CLI::App& app, Context& context);
 void add_rig(CLI::App& app, Context& context);
 void add_config(CLI::App& app, Context& context);
 void add_export(CLI::App& app, Context& context);
+void add_view(CLI::App& app, Context& context);
 void add_map(CLI::App& app, Context& context);
 void add_features(CLI::App& app, Context& context);
 void add_evaluate(CLI::App& app, Context& context);

@@ -42,6 +42,9 @@ void add_commands(CLI::App& app, Context& context) {
   add_rig(app, context);
   add_config(app, context);
   add_export(app, context);
+#ifdef SPARTAN_HAS_VIEWER
+  add_view(app, context);
+#endif
   add_simulate(app, context);
   add_completion(app, context);
 }

@@ -72,6 +72,7 @@ struct Odometer::State {
   SmoothedImage left_smooth, right_smooth;
   ImagePyramid pyramid, right_pyramid;  ///< of the current images; that of the right one where it is needed
   OdometerMemory memory;
+  std::vector<LandmarkTrack> tracks;  ///< of the latest frame
 
   std::optional<std::string> defect_of(const RectifiedPair& pair) const;
   /// Whether the latest motion may be that of an object.
@@ -86,6 +87,7 @@ struct Odometer::State {
   void measure_from_any(const StereoImages& images, const MotionPrediction& prediction, bool blurred,
                         MotionEstimate& estimate);
   void advance(const StereoImages& images, bool usable, bool same_geometry, MotionEstimate& estimate);
+  void keep_tracks(const MotionMeasurement& measured);
   void keep(LandmarkFrame frame) { memory.kept = {std::move(frame), memory.reference.stamp, {}, 0, 0}; }
   void follow_kept(const MotionEstimate& estimate, const Sharpness& sharpness, bool blurred);
 };
@@ -129,6 +131,14 @@ MotionMeasurement Odometer::State::measure(const LandmarkFrame& previous, const 
   return measured;
 }
 
+void Odometer::State::keep_tracks(const MotionMeasurement& measured) {
+  for (std::size_t i = 0; i < measured.kept.size(); ++i) {
+    const LandmarkMatch& match = measured.kept[i];
+    tracks.push_back({memory.reference.map.landmarks[match.landmark].pixel.cast<float>(),
+                      match.measured.head<2>().cast<float>(), measured.fit.inlier[i]});
+  }
+}
+
 /// A motion from the reference. Where it was measured in the left image the landmarks of the reference are updated.
 void Odometer::State::accept(const MotionMeasurement& measured, const StereoImages& images, MotionEstimate& estimate) {
   Stopwatch watch;
@@ -141,6 +151,7 @@ void Odometer::State::accept(const MotionMeasurement& measured, const StereoImag
   estimate.inliers = measured.fit.inliers;
   estimate.rms_px = measured.fit.rms_px;
   if (estimate.keeps_reference) return;
+  keep_tracks(measured);
   LandmarkMemory& map = memory.reference.map;
   memory.offset = measured.fit.offset;
   for (const std::size_t i : measured.on_object) discard(map.landmarks[i]);
@@ -276,6 +287,7 @@ Odometer::~Odometer() = default;
 MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose>& predicted,
                              ImageView<const float> disparity, const std::optional<Pose>& alternative) {
   State& s = *state_;
+  s.tracks.clear();
   Stopwatch all;
   MotionEstimate estimate;
   estimate.to = pair.stamp;
@@ -324,6 +336,10 @@ MotionEstimate Odometer::add(const RectifiedPair& pair, const std::optional<Pose
   estimate.landmarks = static_cast<int>(s.memory.reference.map.landmarks.size());
   estimate.times.total = all.lap();
   return estimate;
+}
+
+std::span<const LandmarkTrack> Odometer::tracks() const {
+  return state_->tracks;
 }
 
 Bytes Odometer::save() const {

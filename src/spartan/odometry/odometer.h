@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "spartan/core/archive.h"
@@ -406,6 +407,12 @@ struct MotionEstimate {
   OdometryTimes times;
 };
 
+/// A landmark by which a motion was measured, in the rectified left images at MotionEstimate::from and `to`.
+struct LandmarkTrack {
+  Eigen::Vector2f previous_px, current_px;
+  bool is_inlier = false;
+};
+
 /// Stereo visual odometry of the SPARTAN paper (Kostavelis et al., ICCV Workshops 2011): landmark detection → landmark
 /// 3D reconstruction → landmark matching → motion estimation. It keeps the landmarks of t−1 (the published "1/z"
 /// block). Derivation: docs/math/odometry.md.
@@ -424,6 +431,9 @@ class Odometer {
   /// is not empty. Never fails: a pair that cannot be used gives the status `lost` with a reason.
   MotionEstimate add(const RectifiedPair& pair, const std::optional<Pose>& predicted = {},
                      ImageView<const float> disparity = {}, const std::optional<Pose>& alternative = {});
+
+  /// Of the latest frame, valid until the next one; none where its motion was not measured in the left image.
+  std::span<const LandmarkTrack> tracks() const;
 
   /// The state as a versioned value; after restore() the following estimates are the same, bit for bit. restore() fails
   /// with code `configuration` where the bytes are of another version, `store_damaged` where they are damaged, and then

@@ -65,6 +65,33 @@ TEST(Odometer, FollowsASyntheticDrive) {
   EXPECT_LT(nees, 15);  // expected value 6; nine correlated samples
 }
 
+// By the true disparities and the true motion.
+TEST(Odometer, TracksAreTheLandmarksOfAMotion) {
+  Odometer odometer = Odometer::create({}, ThreadPool(1)).value();
+  odometer.add(pair_of(0));
+  EXPECT_TRUE(odometer.tracks().empty());
+  for (int i = 1; i < 4; ++i) {
+    const MotionEstimate estimate = odometer.add(pair_of(i));
+    std::vector<double> errors;
+    for (const LandmarkTrack& track : odometer.tracks()) {
+      const Eigen::Vector2d from = track.previous_px.cast<double>();
+      const float d = frame_of(i - 1).disparity(static_cast<int>(std::lround(from.x())), static_cast<int>(std::lround(from.y())));
+      if (!track.is_inlier || std::isnan(d)) continue;
+      const Eigen::Vector3d point = kCameras.triangulate(from.x(), from.y(), static_cast<double>(d));
+      const Eigen::Vector3d seen = kCameras.project(true_motion(i - 1, i).inverse() * point);
+      errors.push_back((seen.head<2>() - track.current_px.cast<double>()).norm());
+    }
+    const auto inliers = std::count_if(odometer.tracks().begin(), odometer.tracks().end(), [](const LandmarkTrack& t) { return t.is_inlier; });
+    EXPECT_EQ(inliers, estimate.inliers);
+    ASSERT_GT(errors.size(), 100U);
+    std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
+    EXPECT_LT(errors[errors.size() / 2], 0.3);
+  }
+  const Image<std::uint8_t> blank(320, 240, 128);
+  odometer.add(blank_pair(blank, 4));
+  EXPECT_TRUE(odometer.tracks().empty());
+}
+
 TEST(Odometer, EverySubModuleCanBeSwitchedOff) {
   for (const char* switched :
        {"detection.surf.upright=false", "reconstruction.source=dense", "reconstruction.left_right_check=false",

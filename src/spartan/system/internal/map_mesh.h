@@ -8,14 +8,9 @@
 #include <vector>
 
 #include "spartan/core/image.h"
-#include "spartan/reconstruction/point_cloud.h"
 #include "spartan/slam/global_map.h"
 
 namespace spartan::internal {
-
-/// Colours of the cells: the mean of the points in each cell; cells without a point are coloured by elevation and
-/// class, as in render_map(). Size of the view.
-Image<Rgb8> cell_colours(const MapView& view, const PointCloud& points);
 
 /// A vertex a known cell, at its centre and elevation.
 struct TerrainMesh {

@@ -1,0 +1,72 @@
+#include "viewer/map_layers.h"
+
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+namespace spartan::viewer {
+namespace {
+
+constexpr double kMostCells = 400'000;
+
+class Layers {
+ public:
+  Layers(const MapView& view, int step) : view_(view), step_(step) {}
+  int width() const { return (view_.window.width + step_ - 1) / step_; }
+  int height() const { return (view_.window.height + step_ - 1) / step_; }
+
+  // `value` of (column, row) has the type of the layer.
+  template <class Value>
+  void add(const char* name, const char* type, const Value& value) {
+    while (bytes_.size() % 4 != 0) bytes_ += '\0';
+    list_.push_back({{"name", name}, {"type", type}, {"offset", bytes_.size()}});
+    for (int r = 0; r < view_.window.height; r += step_) {
+      for (int c = 0; c < view_.window.width; c += step_) {
+        const auto element = value(c, r);
+        bytes_.append(reinterpret_cast<const char*>(&element), sizeof(element));
+      }
+    }
+  }
+
+  std::string file() const {
+    const GeoTransform place = view_.place();
+    const double cell_m = place.cell_m * step_;
+    std::string header = nlohmann::json{
+        {"width", width()},
+        {"height", height()},
+        {"cell_m", cell_m},
+        {"west_m", place.west_m + (place.cell_m - cell_m) / 2},  // the kept cells are the centres of larger ones
+        {"north_m", place.north_m - (place.cell_m - cell_m) / 2},
+        {"layers", list_}}.dump();
+    header.resize((header.size() + 3) / 4 * 4, ' ');
+    const auto length = static_cast<std::uint32_t>(header.size());
+    return std::string(reinterpret_cast<const char*>(&length), sizeof(length)) + header + bytes_;
+  }
+
+ private:
+  const MapView& view_;
+  int step_;
+  nlohmann::json list_ = nlohmann::json::array();
+  std::string bytes_;
+};
+
+}  // namespace
+
+Result<std::string> map_layers(SavedMap& saved) {
+  const auto view = saved.map().view(saved.map().extent());
+  if (!view) return failure(view);
+  const auto request = saved.request(MapFormat::gltf);
+  if (!request) return failure(request);
+  const Traversability shape = view->shape(saved.options().mapping.map, ThreadPool(1));
+  const Image<Rgb8> colours = cell_colours(*view, request->points);
+  Layers layers(*view, static_cast<int>(std::ceil(std::sqrt(static_cast<double>(view->window.cells()) / kMostCells))));
+  layers.add("elevation_m", "float32", [&](int c, int r) { return view->elevation_m(c, r); });
+  layers.add("sigma_m", "float32", [&](int c, int r) { return std::sqrt(view->variance_m2(c, r)); });
+  layers.add("cost", "float32", [&](int c, int r) { return shape.cost(c, r); });
+  layers.add("class", "uint8", [&](int c, int r) { return static_cast<std::uint8_t>(view->kind(c, r)); });
+  layers.add("colour", "rgb8", [&](int c, int r) { return colours(c, r); });
+  return layers.file();
+}
+
+}  // namespace spartan::viewer

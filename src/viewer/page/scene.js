@@ -1,0 +1,277 @@
+'use strict';
+// The terrain and the trajectories in 3D: makeScene(element) returns {setMap, setFrames, setTime, colourBy, fromAbove, follow}.
+// World axes: x forward or east, y left or north, z up, in metres.
+(() => {
+  // "cividis" (Nuñez, Anderton & Renslow, PLOS ONE 2018) at eight points: even steps of lightness, also for colour-blind readers.
+  const kRamp = [[0, 34, 78], [33, 60, 110], [74, 84, 109], [104, 110, 114], [136, 136, 121], [172, 163, 113], [211, 193, 96], [253, 232, 64]];
+  // Unknown, free, obstacle, cavity (Okabe & Ito).
+  const kClasses = [[150, 150, 150], [120, 190, 165], [213, 94, 0], [0, 114, 178]];
+  const kUnknown = [170, 165, 160];
+  const kTrajectories = {odometry: '--orange', slam: '--light-blue', localization: '--blue', smoothed: '--purple'};
+
+  const ramp = value => {
+    const at = Math.min(Math.max(value, 0), 1) * (kRamp.length - 1), low = Math.min(Math.floor(at), kRamp.length - 2), part = at - low;
+    return kRamp[low].map((c, i) => c + part * (kRamp[low + 1][i] - c));
+  };
+  const rampCss = () => `linear-gradient(to right, ${kRamp.map(c => `rgb(${c})`).join(', ')})`;
+  const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+  // The 2nd and the 98th percentile of the known values.
+  const spanOf = values => {
+    const known = Float32Array.from(values.filter(v => Number.isFinite(v))).sort();
+    if (known.length === 0) return [0, 1];
+    const low = known[Math.floor(0.02 * (known.length - 1))], high = known[Math.floor(0.98 * (known.length - 1))];
+    return high > low ? [low, high] : [low, low + 1e-6];
+  };
+
+  const readMap = buffer => {
+    const length = new DataView(buffer).getUint32(0, true);
+    const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+    const cells = header.width * header.height, map = {...header};
+    for (const {name, type, offset} of header.layers) {
+      const at = 4 + length + offset;
+      map[name] = type === 'float32' ? new Float32Array(buffer, at, cells)
+        : new Uint8Array(buffer, at, type === 'rgb8' ? 3 * cells : cells);
+    }
+    return map;
+  };
+
+  // Two triangles between four known cells, one between three.
+  const terrainGeometry = map => {
+    const {width, height, cell_m: cell} = map, numbers = new Int32Array(width * height).fill(-1), positions = [], cells = [];
+    for (let i = 0; i < width * height; ++i) {
+      if (!Number.isFinite(map.elevation_m[i])) continue;
+      numbers[i] = cells.length;
+      cells.push(i);
+      positions.push(map.west_m + (i % width + 0.5) * cell, map.north_m - (Math.floor(i / width) + 0.5) * cell, map.elevation_m[i]);
+    }
+    const triangles = [];
+    for (let r = 0; r + 1 < height; ++r) {
+      for (let c = 0; c + 1 < width; ++c) {
+        const i = r * width + c, known = [i, i + width, i + width + 1, i + 1].map(k => numbers[k]).filter(n => n >= 0);
+        if (known.length >= 3) triangles.push(known[0], known[1], known[2]);
+        if (known.length === 4) triangles.push(known[0], known[2], known[3]);
+      }
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute('position', new THREE.Float32BufferAttribute(positions, 3));
+    geometry.setAttribute('color', new THREE.BufferAttribute(new Uint8Array(3 * cells.length), 3, true));
+    geometry.setIndex(new THREE.Uint32BufferAttribute(triangles, 1));
+    geometry.computeVertexNormals();
+    geometry.computeBoundingSphere();
+    return {geometry, cells: Int32Array.from(cells)};
+  };
+
+  const rover = () => {
+    const cone = new THREE.ConeBufferGeometry(0.12, 0.4, 4);
+    cone.rotateZ(-Math.PI / 2);  // towards +x
+    const mesh = new THREE.Mesh(cone, new THREE.MeshLambertMaterial({color: 0xd55e00}));
+    mesh.position.z = 0.1;
+    const group = new THREE.Group();
+    group.add(mesh);
+    return group;
+  };
+
+  // The horizontal ellipse of three standard deviations, of a covariance [xx, xy, yy].
+  const ellipsePoints = ([xx, xy, yy], [x, y, z], points) => {
+    const mean = (xx + yy) / 2, half = Math.hypot((xx - yy) / 2, xy), angle = Math.atan2(2 * xy, xx - yy) / 2;
+    const a = 3 * Math.sqrt(Math.max(0, mean + half)), b = 3 * Math.sqrt(Math.max(0, mean - half)), kSteps = 24;
+    let last = null;
+    for (let k = 0; k <= kSteps; ++k) {
+      const u = a * Math.cos(2 * Math.PI * k / kSteps), v = b * Math.sin(2 * Math.PI * k / kSteps);
+      const next = [x + u * Math.cos(angle) - v * Math.sin(angle), y + u * Math.sin(angle) + v * Math.cos(angle), z];
+      if (last) points.push(...last, ...next);
+      last = next;
+    }
+  };
+
+  window.makeScene = element => {
+    const renderer = new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
+    renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    element.append(renderer.domElement);
+    const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(45, 1, 0.05, 5000);
+    camera.up.set(0, 0, 1);
+    camera.position.set(-4, -4, 4);
+    scene.add(new THREE.HemisphereLight(0xffffff, 0x887766, 0.75));
+    const sun = new THREE.DirectionalLight(0xffffff, 0.55);
+    sun.position.set(-1, 1, 1.5);
+    scene.add(sun);
+    const controls = new THREE.OrbitControls(camera, renderer.domElement);
+    controls.screenSpacePanning = false;
+    const marker = rover(), lines = {}, limits = {};
+    scene.add(marker);
+    let terrain = null, map = null, layer = 'colour', framed = false, following = false, asked = false, frames = null, now = 0;
+    let drawn = 0;
+
+    const draw = () => {
+      asked = false;
+      renderer.render(scene, camera);
+      ++drawn;
+    };
+    const ask = () => {
+      if (!asked) requestAnimationFrame(draw);
+      asked = true;
+    };
+    const resize = () => {
+      const {clientWidth: width, clientHeight: height} = element;
+      if (width === 0 || height === 0) return;
+      renderer.setSize(width, height);
+      camera.aspect = width / height;
+      camera.updateProjectionMatrix();
+      ask();
+    };
+    new ResizeObserver(resize).observe(element);
+    controls.addEventListener('change', ask);
+    element.addEventListener('keydown', event => {
+      const by = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
+      if (!by) return;
+      event.preventDefault();
+      const ahead = new THREE.Vector3().subVectors(controls.target, camera.position).setZ(0).normalize();
+      const step = camera.position.distanceTo(controls.target) / 12;
+      const move = new THREE.Vector3(ahead.y, -ahead.x, 0).multiplyScalar(by[0] * step).addScaledVector(ahead, by[1] * step);
+      camera.position.add(move);
+      controls.target.add(move);
+      controls.update();
+      ask();
+    });
+
+    const look = (centre, radius, direction) => {
+      controls.target.copy(centre);
+      camera.position.copy(centre).addScaledVector(direction, Math.max(radius, 1) * 2.2);
+      controls.update();
+      ask();
+    };
+    const whole = () => {
+      const box = new THREE.Box3();
+      for (const object of [terrain, ...Object.values(lines)]) if (object && object.visible !== false) box.expandByObject(object);
+      if (box.isEmpty()) return {centre: new THREE.Vector3(), radius: 2};
+      const sphere = box.getBoundingSphere(new THREE.Sphere());
+      return {centre: sphere.center, radius: sphere.radius};
+    };
+    const frameAll = direction => {
+      const {centre, radius} = whole();
+      look(centre, radius, direction.normalize());
+    };
+
+    const paint = () => {
+      if (!terrain) return null;
+      const {cells} = terrain.userData, colours = terrain.geometry.getAttribute('color');
+      const values = map[layer], span = layer === 'colour' || layer === 'class' ? null
+        : layer === 'cost' ? [0, 1] : limits[layer] || (limits[layer] = spanOf(values));
+      cells.forEach((cell, vertex) => {
+        const colour = layer === 'colour' ? [values[3 * cell], values[3 * cell + 1], values[3 * cell + 2]]
+          : layer === 'class' ? kClasses[values[cell]]
+          : Number.isFinite(values[cell]) ? ramp((values[cell] - span[0]) / (span[1] - span[0])) : kUnknown;
+        colours.array.set(colour, 3 * vertex);
+      });
+      colours.needsUpdate = true;
+      ask();
+      return span;
+    };
+    const setLine = (name, points, colour, segments = false, width = 1) => {
+      if (lines[name]) {
+        scene.remove(lines[name]);
+        lines[name].geometry.dispose();
+      }
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
+      lines[name] = new (segments ? THREE.LineSegments : THREE.Line)(geometry, new THREE.LineBasicMaterial({color: colour, linewidth: width}));
+      scene.add(lines[name]);
+    };
+
+    const api = {
+      setMap(buffer) {
+        map = readMap(buffer);
+        if (terrain) {
+          scene.remove(terrain);
+          terrain.geometry.dispose();
+        }
+        for (const name of Object.keys(limits)) delete limits[name];
+        const {geometry, cells} = terrainGeometry(map);
+        terrain = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({vertexColors: THREE.VertexColors, side: THREE.DoubleSide}));
+        terrain.userData = {cells};
+        scene.add(terrain);
+        const span = paint();
+        if (!framed) {
+          framed = true;
+          frameAll(new THREE.Vector3(-0.7, -0.7, 0.8));
+        }
+        return span;
+      },
+      setFrames(columns) {
+        frames = columns;
+        for (const [kind, colour] of Object.entries(kTrajectories)) {
+          const points = [];
+          for (const p of columns[kind]) if (p) points.push(p[0], p[1], p[2] + 0.02);
+          if (points.length > 3) setLine(kind, points, css(colour));
+        }
+        // At most 60 ellipses, evenly.
+        const step = Math.max(1, Math.floor(columns.pose.length / 60)), points = [];
+        for (let i = 0; i < columns.pose.length; i += step) {
+          if (columns.pose[i]) ellipsePoints(columns.ellipse_m2[i], [columns.pose[i][0], columns.pose[i][1], columns.pose[i][2] + 0.02], points);
+        }
+        setLine('ellipses', points, css('--blue'), true);
+        if (!framed && !terrain && columns.pose.length > 1) frameAll(new THREE.Vector3(-0.7, -0.7, 0.8));
+        ask();
+      },
+      setTime(index) {
+        now = index;
+        const pose = frames && frames.pose[index];
+        marker.visible = Boolean(pose);
+        if (pose) {
+          const before = marker.position.clone();
+          marker.position.set(pose[0], pose[1], pose[2]);
+          marker.quaternion.set(pose[3], pose[4], pose[5], pose[6]);
+          if (following) {
+            const moved = marker.position.clone().sub(before);
+            camera.position.add(moved);
+            controls.target.copy(marker.position);
+            controls.update();
+          }
+        }
+        ask();
+      },
+      colourBy(name) {
+        layer = name;
+        return paint();
+      },
+      fromAbove() {
+        frameAll(new THREE.Vector3(0, -0.001, 1));
+      },
+      follow(on) {
+        following = on;
+        if (on) {
+          controls.target.copy(marker.position);
+          camera.position.copy(marker.position).add(new THREE.Vector3(-4, -2, 3));
+          controls.update();
+          ask();
+        }
+      },
+      repaint() {
+        if (frames) api.setFrames(frames);
+      },
+      // Of a test: draws so many frames while the camera turns, and returns the time of each in ms.
+      async measure(count) {
+        const times = [];
+        let last = performance.now();
+        for (let i = 0; i < count; ++i) {
+          await new Promise(done => requestAnimationFrame(done));
+          const offset = camera.position.clone().sub(controls.target).applyAxisAngle(new THREE.Vector3(0, 0, 1), 0.02);
+          camera.position.copy(controls.target).add(offset);
+          controls.update();
+          renderer.render(scene, camera);
+          renderer.getContext().finish();
+          times.push(performance.now() - last);
+          last = performance.now();
+        }
+        return times;
+      },
+      state: () => ({drawn, vertices: terrain ? terrain.geometry.getAttribute('position').count : 0, time: now,
+        rover: marker.position.toArray(), lines: Object.keys(lines)}),
+      canvas: renderer.domElement,
+      rampCss, classes: kClasses, trajectories: kTrajectories,
+    };
+    resize();
+    return api;
+  };
+})();

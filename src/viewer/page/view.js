@@ -1,0 +1,191 @@
+'use strict';
+// Asks for the run, shows it, and, while it goes on, asks again every second.
+(() => {
+  const at = id => document.getElementById(id);
+  const scene = makeScene(at('scene')), plots = makePlots(at('plots'), index => show(index));
+  let run = null, frames = null, now = 0, playing = null, mapsShown = -1, shownView = -1, request = 0;
+  const errors = [];
+
+  const get = async (path, kind = 'json') => {
+    const response = await fetch(path);
+    if (!response.ok) throw new Error(await response.text());
+    return kind === 'json' ? response.json() : response.arrayBuffer();
+  };
+
+  // ---- legends
+
+  const key = (text, colour) => {
+    const made = document.createElement('span'), swatch = document.createElement('span');
+    made.className = 'key';
+    swatch.className = 'swatch';
+    swatch.style.background = colour;
+    made.append(swatch, text);
+    return made;
+  };
+  const units = {elevation_m: 'm', sigma_m: 'm', cost: ''};
+  const legend = span => {
+    const box = at('scene-legend'), layer = at('colour-by').value;
+    box.replaceChildren();
+    for (const [kind, colour] of Object.entries(scene.trajectories)) {
+      if (frames && frames[kind].some(p => p)) box.append(key(kind, `var(${colour})`));
+    }
+    if (frames) box.append(key('ellipses: three standard deviations of the position', 'var(--blue)'));
+    if (layer === 'class') ['', 'free', 'obstacle', 'cavity'].forEach((name, i) => name && box.append(key(name, `rgb(${scene.classes[i]})`)));
+    if (span) {
+      const made = document.createElement('span'), bar = document.createElement('span'), digits = layer === 'sigma_m' ? 4 : 2;
+      made.className = 'key';
+      bar.className = 'ramp';
+      bar.style.background = scene.rampCss();
+      made.append(`${span[0].toFixed(digits)} ${units[layer]}`, bar, `${span[1].toFixed(digits)} ${units[layer]}`);
+      box.append(made);
+    }
+  };
+
+  // ---- one moment
+
+  const drawLandmarks = data => {
+    const canvas = at('landmarks'), image = at('image');
+    canvas.width = image.naturalWidth || 1;
+    canvas.height = image.naturalHeight || 1;
+    const context = canvas.getContext('2d');
+    context.lineWidth = Math.max(1, canvas.width / 500);
+    for (const [x0, y0, x1, y1, inlier] of data.tracks) {
+      context.strokeStyle = inlier ? '#00d08a' : '#ff7f2a';  // on gray images: green and orange differ in lightness, too
+      context.beginPath();
+      context.moveTo(data.unit_px * x0, data.unit_px * y0);
+      context.lineTo(data.unit_px * x1, data.unit_px * y1);
+      context.stroke();
+      context.beginPath();
+      context.arc(data.unit_px * x1, data.unit_px * y1, canvas.width / (inlier ? 320 : 450), 0, 2 * Math.PI);
+      context.stroke();
+    }
+    const agree = data.tracks.filter(t => t[4]).length;
+    at('image-note').textContent = data.tracks.length === 0 ? 'No motion was measured to this frame.'
+      : `${agree} inliers (green), ${data.tracks.length - agree} outliers (orange), and where they were in the frame before.`;
+  };
+  const showImage = async index => {
+    const mine = ++request;
+    if (!run.has_images) {
+      at('image-note').textContent = 'No images: name the recording by --recording.';
+      return;
+    }
+    const image = at('image');
+    image.src = `/api/image?frame=${index}`;
+    try {
+      await image.decode();
+    } catch (error) {
+      if (mine === request) at('image-note').textContent = 'This frame has no image.';
+      return;
+    }
+    if (mine !== request) return;
+    at('landmarks').width = 1;
+    at('image-note').textContent = '';
+    if (!at('show-landmarks').checked || playing) return;
+    try {
+      const data = await get(`/api/landmarks?frame=${index}`);
+      if (mine === request) drawLandmarks(data);
+    } catch (error) {
+      if (mine === request) at('image-note').textContent = error.message;
+    }
+  };
+  // The last terrain view at or before the frame.
+  const showDisparity = index => {
+    let view = -1;
+    run.terrain.forEach((frame, i) => { if (frame >= 0 && frame <= index) view = i; });
+    at('disparity-panel').classList.toggle('hidden', run.terrain.length === 0);
+    if (view === shownView || view < 0) return;
+    shownView = view;
+    at('disparity').src = `/api/disparity?view=${view}`;
+    at('disparity-note').textContent = `Terrain view ${view + 1} of ${run.terrain.length}, at ${frames.t_s[run.terrain[view]].toFixed(2)} s. Near is red, unknown black.`;
+  };
+  let waiting = null;
+  const show = index => {
+    now = index;
+    at('time').value = index;
+    const status = frames.status[index], message = frames.message[index];
+    at('frame').textContent = `${index + 1} of ${frames.total}, ${frames.t_s[index].toFixed(2)} s, ${status}`;
+    at('frame').title = message;
+    scene.setTime(index);
+    plots.setTime(index);
+    showDisparity(index);
+    clearTimeout(waiting);
+    waiting = setTimeout(() => showImage(index), playing ? 0 : 80);
+  };
+
+  // ---- the run as it grows
+
+  const append = more => {
+    if (!frames || more.from === 0) return more;
+    for (const [name, value] of Object.entries(more)) {
+      if (Array.isArray(value)) frames[name] = frames[name].concat(value);
+    }
+    for (const table of ['stages', 'sensors']) {
+      for (const [name, values] of Object.entries(more[table])) {
+        frames[table][name] = (frames[table][name] || new Array(more.from).fill(null)).concat(values);
+      }
+      for (const values of Object.values(frames[table])) while (values.length < more.total) values.push(null);
+    }
+    frames.total = more.total;
+    return frames;
+  };
+  const refresh = async () => {
+    run = await get('/api/run');
+    document.title = `Spartan: ${run.name}`;
+    at('name').textContent = run.name;
+    const have = frames ? frames.total : 0, wasLast = !frames || now === frames.total - 1;
+    if (run.frames !== have) {
+      frames = append(await get(`/api/frames?from=${run.frames > have ? have : 0}`));
+      at('time').max = frames.total - 1;
+      scene.setFrames(frames);
+      plots.setFrames(frames);
+    }
+    if (run.maps !== mapsShown) {
+      try {
+        scene.setMap(await get('/api/map', 'buffer'));
+        mapsShown = run.maps;
+      } catch (error) {
+        mapsShown = -1;  // a run without a map, or not yet
+      }
+      legend(scene.colourBy(at('colour-by').value));
+    } else if (run.frames !== have) {
+      legend(scene.colourBy(at('colour-by').value));
+    }
+    if (frames && run.frames !== have) show(have === 0 && run.ended ? 0 : wasLast ? frames.total - 1 : now);
+    at('state').textContent = `${run.frames} frames, ${run.terrain.length} terrain views, ${run.maps} local maps, rig ${run.rig}${run.ended ? '' : '; the run goes on'}`;
+  };
+  const follow = async () => {
+    try {
+      await refresh();
+    } catch (error) {
+      errors.push(error.message);
+      at('state').textContent = `Not answered: ${error.message}`;
+    }
+    if (!run || !run.ended) setTimeout(follow, 1000);
+  };
+
+  // ---- controls
+
+  at('time').addEventListener('input', () => show(+at('time').value));
+  at('colour-by').addEventListener('change', () => legend(scene.colourBy(at('colour-by').value)));
+  at('from-above').addEventListener('click', () => scene.fromAbove());
+  at('follow-rover').addEventListener('click', event => {
+    const on = event.target.getAttribute('aria-pressed') !== 'true';
+    event.target.setAttribute('aria-pressed', on);
+    scene.follow(on);
+  });
+  at('show-landmarks').addEventListener('change', () => showImage(now));
+  const play = on => {
+    at('play').setAttribute('aria-pressed', on);
+    at('play').textContent = on ? 'Pause' : 'Play';
+    clearInterval(playing);
+    playing = on ? setInterval(() => show((now + 1) % frames.total), 100) : null;
+    if (!on) showImage(now);
+  };
+  at('play').addEventListener('click', () => frames && play(!playing));
+  window.matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => {
+    scene.repaint();
+    plots.repaint();
+  });
+  window.spartan = {scene, plots, errors, state: () => ({now, total: frames ? frames.total : 0, mapsShown})};  // for tests
+  follow();
+})();

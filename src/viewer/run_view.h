@@ -1,0 +1,62 @@
+// What the page of a run asks for, read from the run folder as it grows.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "spartan/camera/recording.h"
+#include "spartan/core/result.h"
+#include "spartan/imaging/imager.h"
+#include "spartan/rig/rig.h"
+#include "spartan/system/run_folder.h"
+#include "spartan/system/run_options.h"
+#include "spartan/system/run_store.h"
+#include "viewer/view_server.h"
+
+namespace spartan::viewer {
+
+/// May be called by several threads.
+class RunView {
+ public:
+  static Result<std::unique_ptr<RunView>> open(const ViewRequest& request);
+
+  /// JSON: name, numbers of frames, terrain views and local maps, whether the run has ended.
+  Result<std::string> overview();
+  /// JSON: an array for each quantity, of the frames from number `from` on; `t_s` counts from the first frame.
+  Result<std::string> frames(std::size_t from);
+  /// The global map: a JSON header with the layers and their places, padded to a multiple of four bytes, behind its
+  /// length (4 bytes, little endian); then the layers. Large maps are thinned. Code `input`: there is none.
+  Result<std::string> map();
+  /// The rectified left image of a frame as JPEG. Code `input`: there is no recording, or not this frame.
+  Result<std::string> image(std::size_t frame);
+  /// JSON: the landmarks by which the motion to this frame was measured, in the rectified left image. They are searched
+  /// anew, from this frame and the one before.
+  Result<std::string> landmarks(std::size_t frame);
+  /// The disparity image of a terrain view, in colour, as PNG.
+  Result<std::string> disparity(std::size_t view);
+
+ private:
+  RunView(const ViewRequest& request, RunFolder folder, Rig rig, RunOptions options)
+      : request_(request), folder_(std::move(folder)), rig_(std::move(rig)), options_(std::move(options)) {}
+  Status refresh();
+  Status open_recording_again();
+  Result<StereoFrame> frame_at(std::size_t frame);
+
+  ViewRequest request_;
+  RunFolder folder_;
+  Rig rig_;
+  RunOptions options_;
+  std::mutex mutex_;
+  std::string version_;  // of the store's files
+  std::vector<FrameRecord> frames_;
+  std::vector<TerrainRecord> terrain_;
+  std::vector<MapRecord> maps_;
+  std::unique_ptr<Recording> recording_;
+  std::optional<Imager> imager_;
+};
+
+}  // namespace spartan::viewer

@@ -1,0 +1,121 @@
+#include "viewer/view_server.h"
+
+#include <fmt/format.h>
+#include <httplib.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <optional>
+#include <utility>
+
+#include "viewer/page_files.h"
+#include "viewer/run_view.h"
+
+namespace spartan::viewer {
+
+namespace {
+
+constexpr const char* kJson = "application/json";
+
+// A page of another site may have a name that leads here (DNS rebinding): it is not answered.
+bool names_this_computer(const httplib::Request& request, const std::string& address) {
+  std::string host = request.get_header_value("Host");
+  host.resize(std::min(host.size(), host.rfind(':')));
+  return host == "localhost" || host == "127.0.0.1" || host == address;
+}
+
+void answer(const Result<std::string>& content, const char* type, httplib::Response& response) {
+  if (content) return response.set_content(*content, type);
+  response.status = content.error().code == ErrorCode::input ? 404 : 500;
+  response.set_content(content.error().message(), "text/plain; charset=utf-8");
+}
+
+std::optional<std::size_t> number_in(const httplib::Request& request, const char* name) {
+  const std::string text = request.get_param_value(name);
+  std::size_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+// Answers with what `member` gives for the number in the query.
+auto numbered(RunView& view, Result<std::string> (RunView::*member)(std::size_t), const char* name, const char* type) {
+  return [&view, member, name, type](const httplib::Request& request, httplib::Response& response) {
+    const auto number = number_in(request, name);
+    if (number) return answer((view.*member)(*number), type, response);
+    response.status = 400;
+    response.set_content(fmt::format("{}: must be a number", name), "text/plain; charset=utf-8");
+  };
+}
+
+}  // namespace
+
+struct ViewServer::State {
+  std::unique_ptr<RunView> view;
+  httplib::Server server;
+  std::string address;
+
+  void add_routes();
+};
+
+void ViewServer::State::add_routes() {
+  server.set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
+    if (names_this_computer(request, address)) return httplib::Server::HandlerResponse::Unhandled;
+    response.status = 403;
+    response.set_content("ask for localhost", "text/plain; charset=utf-8");
+    return httplib::Server::HandlerResponse::Handled;
+  });
+  server.set_default_headers(
+      {{"Cache-Control", "no-store"},
+       {"Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'"},
+       {"X-Content-Type-Options", "nosniff"}});
+  for (const PageFile& file : page_files()) {
+    server.Get(file.path, [&file](const httplib::Request&, httplib::Response& response) {
+      response.set_content(std::string(file.content), file.type);
+    });
+  }
+  server.Get("/api/run", [this](const httplib::Request&, httplib::Response& response) {
+    answer(view->overview(), kJson, response);
+  });
+  server.Get("/api/map", [this](const httplib::Request&, httplib::Response& response) {
+    answer(view->map(), "application/octet-stream", response);
+  });
+  server.Get("/api/frames", numbered(*view, &RunView::frames, "from", kJson));
+  server.Get("/api/landmarks", numbered(*view, &RunView::landmarks, "frame", kJson));
+  server.Get("/api/image", numbered(*view, &RunView::image, "frame", "image/jpeg"));
+  server.Get("/api/disparity", numbered(*view, &RunView::disparity, "view", "image/png"));
+}
+
+ViewServer::ViewServer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+ViewServer::ViewServer(ViewServer&&) noexcept = default;
+ViewServer& ViewServer::operator=(ViewServer&&) noexcept = default;
+ViewServer::~ViewServer() = default;
+
+Result<ViewServer> ViewServer::create(const ViewRequest& request) {
+  auto view = RunView::open(request);
+  if (!view) return failure(view);
+  auto state = std::make_unique<State>();
+  state->view = std::move(*view);
+  state->add_routes();
+  return ViewServer(std::move(state));
+}
+
+Result<int> ViewServer::bind(const std::string& address, int port) {
+  state_->address = address;
+  const int bound = port == 0 ? state_->server.bind_to_any_port(address)
+                              : (state_->server.bind_to_port(address, port) ? port : -1);
+  if (bound > 0) return bound;
+  return failure(ErrorCode::output, fmt::format("port {} of {} cannot be used", port, address), "--port",
+                 "another program uses it: leave --port out");
+}
+
+void ViewServer::serve() {
+  state_->server.listen_after_bind();
+}
+
+void ViewServer::stop() {
+  state_->server.stop();
+}
+
+}  // namespace spartan::viewer
