@@ -8,8 +8,9 @@
 namespace spartan {
 
 Image<Rgb8> cell_colours(const MapView& view, const PointCloud& points) {
-  Image<Rgb8> colours =
-      render_map(view.elevation_m, view.kind, view.cell_m, elevation_colour_range(view.elevation_m, view.kind));
+  if (points.empty())
+    return render_map(view.elevation_m, view.kind, view.cell_m, elevation_colour_range(view.elevation_m, view.kind));
+  Image<Rgb8> colours(view.window.width, view.window.height, kUnknownColour);
   Image<std::array<std::uint32_t, 4>> sums(view.window.width, view.window.height);
   const GeoTransform place = view.place();
   for (const ColouredPoint& point : points) {

@@ -52,8 +52,8 @@ struct MapExport {
   PointCloud points = {};  ///< of the ground, world frame: colours of a mesh; without them it is coloured by elevation
 };
 
-/// Colours of the cells: the mean of the points in each cell; cells without a point are coloured by elevation and
-/// class, as in render_map(). Size of the view.
+/// Colours of the cells: the mean of the points in each cell; cells without a point are light gray. Without any points
+/// they are coloured by elevation and class, as in render_map(). Size of the view.
 Image<Rgb8> cell_colours(const MapView& view, const PointCloud& points);
 
 /// The stops of a global map as MapContext has them.

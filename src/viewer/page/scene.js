@@ -116,6 +116,7 @@
       const {clientWidth: width, clientHeight: height} = element;
       if (width === 0 || height === 0) return;
       renderer.setSize(width, height);
+      for (const line of Object.values(lines)) line.material.resolution.set(width, height);
       camera.aspect = width / height;
       camera.updateProjectionMatrix();
       ask();
@@ -143,7 +144,8 @@
     };
     const whole = () => {
       const box = new THREE.Box3();
-      for (const object of [terrain, ...Object.values(lines)]) if (object && object.visible !== false) box.expandByObject(object);
+      if (terrain) box.expandByObject(terrain);
+      for (const pose of frames ? frames.pose : []) if (pose) box.expandByPoint(new THREE.Vector3(pose[0], pose[1], pose[2]));
       if (box.isEmpty()) return {centre: new THREE.Vector3(), radius: 2};
       const sphere = box.getBoundingSphere(new THREE.Sphere());
       return {centre: sphere.center, radius: sphere.radius};
@@ -168,14 +170,18 @@
       ask();
       return span;
     };
-    const setLine = (name, points, colour, segments = false, width = 1) => {
+    // `points` of a line, or pairs of the ends of `segments`. Drawn over the terrain, whose cells may be a little higher.
+    const setLine = (name, points, colour, segments, width_px) => {
       if (lines[name]) {
         scene.remove(lines[name]);
         lines[name].geometry.dispose();
       }
-      const geometry = new THREE.BufferGeometry();
-      geometry.setAttribute('position', new THREE.Float32BufferAttribute(points, 3));
-      lines[name] = new (segments ? THREE.LineSegments : THREE.Line)(geometry, new THREE.LineBasicMaterial({color: colour, linewidth: width}));
+      const geometry = segments ? new THREE.LineSegmentsGeometry() : new THREE.LineGeometry();
+      geometry.setPositions(points);
+      const material = new THREE.LineMaterial({color: new THREE.Color(colour), linewidth: width_px, depthTest: false, transparent: true});
+      material.resolution.set(element.clientWidth, element.clientHeight);
+      lines[name] = new (segments ? THREE.LineSegments2 : THREE.Line2)(geometry, material);
+      lines[name].renderOrder = 1;
       scene.add(lines[name]);
     };
 
@@ -203,14 +209,14 @@
         for (const [kind, colour] of Object.entries(kTrajectories)) {
           const points = [];
           for (const p of columns[kind]) if (p) points.push(p[0], p[1], p[2] + 0.02);
-          if (points.length > 3) setLine(kind, points, css(colour));
+          if (points.length > 3) setLine(kind, points, css(colour), false, 2.5);
         }
         // At most 60 ellipses, evenly.
         const step = Math.max(1, Math.floor(columns.pose.length / 60)), points = [];
         for (let i = 0; i < columns.pose.length; i += step) {
           if (columns.pose[i]) ellipsePoints(columns.ellipse_m2[i], [columns.pose[i][0], columns.pose[i][1], columns.pose[i][2] + 0.02], points);
         }
-        setLine('ellipses', points, css('--blue'), true);
+        if (points.length > 0) setLine('ellipses', points, css('--blue'), true, 1.2);
         if (!framed && !terrain && columns.pose.length > 1) frameAll(new THREE.Vector3(-0.7, -0.7, 0.8));
         ask();
       },
