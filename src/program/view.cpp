@@ -51,6 +51,7 @@ Result<ExitCode> view_command(const Context& context, const ViewArguments& a) {
   while (!interrupted()) std::this_thread::sleep_for(50ms);
   server->stop();
   answers.join();
+  accept_interrupt();
   return kDone;
 }
 

@@ -1,0 +1,264 @@
+#!/usr/bin/env python3
+"""`spartan view`: what it serves, and, where Chromium and Playwright are installed, the page in a browser.
+
+    view_test.py PROGRAM SMALL_RUNS [--screenshots FOLDER] [--run RUN]
+
+SMALL_RUNS: the folder that make_small_runs has filled. RUN: another run for the screenshots and the times of frames.
+Exit code 77 (skipped): the program was built without the viewer.
+"""
+import argparse
+import json
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.error
+import urllib.request
+from contextlib import contextmanager
+from pathlib import Path
+
+VENV_PYTHON = Path(__file__).resolve().parent.parent / ".venv/bin/python3"  # made by ./setup
+try:
+    from playwright.sync_api import sync_playwright
+except ImportError:
+    if VENV_PYTHON.exists() and Path(sys.prefix) != VENV_PYTHON.parent.parent:
+        os.execv(VENV_PYTHON, [str(VENV_PYTHON), *sys.argv])
+    sync_playwright = None
+
+CHROMIUM = shutil.which("chromium")
+SOFTWARE_WEBGL = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--ignore-gpu-blocklist",
+                  "--enable-unsafe-swiftshader"]
+
+
+def check(holds, message):
+    if not holds:
+        sys.exit(f"failed: {message}")
+
+
+@contextmanager
+def served(program, *arguments):
+    """The address of a view that runs meanwhile."""
+    process = subprocess.Popen([program, "view", *map(str, arguments), "-q"], stdout=subprocess.PIPE, text=True)
+    try:
+        yield process.stdout.readline().strip().rstrip("/")
+    finally:
+        process.terminate()
+        check(process.wait(timeout=20) == 0, f"view ends with exit code {process.returncode}")
+
+
+def get(url, **headers):
+    request = urllib.request.Request(url, headers=headers)
+    try:
+        with urllib.request.urlopen(request, timeout=60) as response:
+            return response.status, response.headers, response.read()
+    except urllib.error.HTTPError as error:
+        return error.code, error.headers, error.read()
+
+
+def json_of(url):
+    status, _, content = get(url)
+    check(status == 200, f"{url}: {status} {content[:200]}")
+    return json.loads(content)
+
+
+def check_answers(program, run, recording):
+    """Each answer against the files of the run."""
+    with served(program, run, "--recording", recording) as url:
+        about = json_of(f"{url}/api/run")
+        poses = [line.split() for line in (run / "trajectory_localization.tum").read_text(encoding="utf-8").splitlines()
+                 if not line.startswith("#")]
+        check(about["frames"] == len(poses) and about["ended"] and about["has_images"], f"overview: {about}")
+        frames = json_of(f"{url}/api/frames?from=0")
+        for pose, found in zip(poses, frames["pose"]):
+            off = max(abs(float(a) - b) for a, b in zip(pose[1:4], found[:3]))
+            check(off < 1e-4, f"pose {found} of {pose}")
+        check(all(len(value) == len(poses) for value in frames.values() if isinstance(value, list)), "columns of one length")
+        check(all(len(v) == len(poses) for table in ("stages", "sensors") for v in frames[table].values()), "stages, sensors")
+        later = json_of(f"{url}/api/frames?from=10")
+        check(later["from"] == 10 and later["t_s"] == frames["t_s"][10:], "frames from a number on")
+
+        _, _, content = get(f"{url}/api/map")
+        (length,) = struct.unpack("<I", content[:4])
+        header = json.loads(content[4 : 4 + length])
+        cells = header["width"] * header["height"]
+        sizes = {"float32": 4, "uint8": 1, "rgb8": 3}
+        ends = [4 + length + layer["offset"] + sizes[layer["type"]] * cells for layer in header["layers"]]
+        check(max(ends) == len(content) and length % 4 == 0, "layers of the map fill the answer")
+        check(all(layer["offset"] % 4 == 0 for layer in header["layers"]), "layers are aligned")
+
+        status, headers, image = get(f"{url}/api/image?frame=3")
+        check(status == 200 and headers["Content-Type"] == "image/jpeg" and image[:2] == b"\xff\xd8", "an image")
+        tracks = json_of(f"{url}/api/landmarks?frame=3")["tracks"]
+        check(sum(track[4] for track in tracks) > 50, f"{len(tracks)} landmarks")
+        status, _, disparity = get(f"{url}/api/disparity?view=0")
+        stamp = frames["stamp_ns"][about["terrain"][0]]
+        check(disparity == (run / f"terrain/{stamp}.png").read_bytes(), "the disparity image is the file of the run")
+
+        for path, expected in (("/api/image?frame=1000", 404), ("/api/disparity?view=99", 404), ("/api/image?frame=x", 400),
+                               ("/api/image", 400), ("/api/frames?from=-1", 400), ("/none", 404), ("/../etc/passwd", 404)):
+            check(get(url + path)[0] == expected, f"{path}: {get(url + path)[0]}, not {expected}")
+        check(get(f"{url}/api/run", Host="evil.example")[0] == 403, "another name of this computer is refused")
+        _, headers, page = get(url + "/")
+        check(b"http://" not in page and b"https://" not in page, "the page names no other computer")
+        check("default-src 'self'" in headers["Content-Security-Policy"], "and may not load from one")
+
+
+def check_bad_input(program, folder):
+    for arguments, code in ((["none"], 3), ([str(folder)], 3)):
+        done = subprocess.run([program, "view", *arguments], capture_output=True, text=True, timeout=30)
+        check(done.returncode in (code, 4) and "error" in done.stderr, f"{arguments}: {done.returncode} {done.stderr}")
+
+
+class Browser:
+    """Pages of a view in headless Chromium; what the console tells is collected."""
+
+    def __init__(self, playwright, url):
+        self.browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_WEBGL)
+        self.url, self.told = url, []
+
+    @contextmanager
+    def page(self, width, scheme="light"):
+        height = 844 if width < 500 else 1000
+        page = self.browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
+        page.on("console", lambda message: message.type == "error" and self.told.append(message.text))
+        page.on("pageerror", lambda error: self.told.append(str(error)))
+        page.on("request", lambda request: request.url.startswith((self.url, "data:", "blob:")) or self.told.append(f"asks {request.url}"))
+        page.goto(self.url + "/")
+        page.wait_for_function("() => window.spartan && spartan.state().total > 0 && document.getElementById('image').naturalWidth > 0")
+        yield page
+        page.close()
+
+
+def pixels_of(page, selector):
+    """Number of different colours on a canvas, on a grid of points."""
+    return page.evaluate("""selector => {
+      const canvas = document.querySelector(selector), copy = document.createElement('canvas');
+      copy.width = canvas.width; copy.height = canvas.height;
+      const context = copy.getContext('2d');
+      context.drawImage(canvas, 0, 0);
+      const data = context.getImageData(0, 0, copy.width, copy.height).data, seen = new Set();
+      for (let i = 0; i < data.length; i += 4 * 97) seen.add(data[i] << 16 | data[i + 1] << 8 | data[i + 2]);
+      return seen.size;
+    }""", selector)
+
+
+def check_page(page, width):
+    """A list of what is asserted is in docs/benchmarks/view.md."""
+    total = page.evaluate("() => spartan.state().total")
+    check(pixels_of(page, "#scene canvas") > 50, f"{width} px: the scene is not blank")
+    page.wait_for_function("() => document.getElementById('landmarks').width > 1")
+    check(pixels_of(page, "#landmarks") > 1, f"{width} px: landmarks are drawn")
+    check(page.evaluate("() => document.documentElement.scrollWidth <= window.innerWidth"), f"{width} px: nothing is wider")
+    check(page.evaluate("() => spartan.plots.count()") > 5, f"{width} px: plots")
+    blank = page.evaluate("""() => [...document.querySelectorAll('.plot canvas')].filter(c =>
+      !c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v)).length""")
+    check(blank == 0, f"{width} px: {blank} plots are blank")
+
+    before = page.evaluate("() => spartan.scene.state().rover")
+    page.focus("#time")
+    page.keyboard.press("End")
+    check(page.evaluate("() => spartan.state().now") == total - 1, f"{width} px: the slider moves by keyboard")
+    check(page.evaluate("() => spartan.scene.state().rover") != before, f"{width} px: and the rover with it")
+    check(f"{total} of {total}" in page.inner_text("#frame"), f"{width} px: the frame is named")
+    page.keyboard.press("Home")
+    drawn = page.evaluate("() => spartan.scene.state().drawn")
+    for layer in ("elevation_m", "class", "cost", "sigma_m", "colour"):
+        page.select_option("#colour-by", layer)
+    page.wait_for_function(f"() => spartan.scene.state().drawn > {drawn}")
+    for button in ("#from-above", "#follow-rover", "#follow-rover", "#play"):
+        page.click(button)
+    page.wait_for_function("() => spartan.state().now > 1")
+    page.click("#play")
+    page.focus("#scene")
+    page.keyboard.press("ArrowLeft")
+    unnamed = page.evaluate("""() => [...document.querySelectorAll('button, input, select')].filter(e =>
+      !(e.textContent.trim() || e.getAttribute('aria-label') || e.closest('label'))).length""")
+    check(unnamed == 0, f"{width} px: {unnamed} controls without a name")
+
+
+def check_in_browser(program, run, recording, screenshots):
+    with served(program, run, "--recording", recording) as url, sync_playwright() as playwright:
+        browser = Browser(playwright, url)
+        for width in (1600, 390):
+            for scheme in ("light", "dark"):
+                with browser.page(width, scheme) as page:
+                    if scheme == "light":
+                        check_page(page, width)
+                    if screenshots:
+                        page.evaluate("() => { const t = document.getElementById('time'); t.value = Math.floor(0.6 * t.max); t.dispatchEvent(new Event('input')); }")
+                        page.wait_for_timeout(1500)
+                        page.screenshot(path=screenshots / f"view_{width}_{scheme}.png", full_page=width < 500)
+        check(not browser.told, f"the console tells nothing: {browser.told}")
+        with browser.page(1600) as page:
+            times = sorted(page.evaluate("() => spartan.scene.measure(60)"))
+            show = page.evaluate("""() => { const begin = performance.now(), n = spartan.state().total;
+              for (let i = 0; i < 20; ++i) { const t = document.getElementById('time'); t.value = Math.floor(i * n / 20); t.dispatchEvent(new Event('input')); }
+              return (performance.now() - begin) / 20; }""")
+            state = page.evaluate("() => [spartan.state().total, spartan.scene.state().vertices]")
+            print(f"{state[0]} frames, {state[1]} vertices: turning the scene {times[30]:.1f} ms a frame (median, rendered without "
+                  f"a graphics card), {show:.1f} ms of script for a step of the slider")
+
+
+def check_live(program, drive, folder):
+    """A page that is open while a run begins, goes on and ends."""
+    run = folder / "live_run"
+    with follow(program, run, drive) as (url, process):
+        with sync_playwright() as playwright:
+            browser = Browser(playwright, url)
+            with browser.page(1600) as page:
+                seen = [page.evaluate("() => spartan.state().total")]
+                while process.poll() is None:
+                    seen.append(page.evaluate("() => spartan.state().total"))
+                    time.sleep(0.3)
+                page.wait_for_function("() => !document.getElementById('state').textContent.includes('goes on')", timeout=20000)
+                seen.append(page.evaluate("() => spartan.state().total"))
+
+            check(len(set(seen)) > 2 and seen == sorted(seen), f"frames arrive while the run goes on: {seen}")
+            total = len([line for line in (run / "trajectory_odometry.tum").read_text().splitlines() if line[0] != "#"])
+            check(seen[-1] == total, f"{seen[-1]} frames at the end, of {total}")
+            check(not browser.told, f"the console tells nothing: {browser.told}")
+
+
+@contextmanager
+def follow(program, run, drive):
+    """A view that waits for a run, and that run."""
+    view = subprocess.Popen([program, "view", str(run), "--follow", "-q"], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen([program, "run", f"replay:{drive}", "-o", str(run), "--speed", "0.5", "-q"], stdout=subprocess.DEVNULL)
+    try:
+        yield view.stdout.readline().strip().rstrip("/"), process
+    finally:
+        check(process.wait(timeout=120) in (0, 6), "the run ends well beside its view")
+        view.terminate()
+        check(view.wait(timeout=20) == 0, "the view ends")
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("small_runs", type=Path)
+    parser.add_argument("--screenshots", type=Path)
+    parser.add_argument("--run", type=Path)
+    a = parser.parse_args()
+    if subprocess.run([a.program, "view", "--help"], capture_output=True).returncode != 0:
+        print("skipped: built without the viewer")
+        return 77
+    drive, run = a.small_runs / "drive", a.small_runs / "drive_run"
+    with tempfile.TemporaryDirectory() as folder:
+        check_answers(a.program, run, drive)
+        check_bad_input(a.program, Path(folder))
+        if sync_playwright is None or CHROMIUM is None:
+            print("not tried: Chromium or Playwright is not installed (./setup docs)")
+            return 0
+        if a.screenshots:
+            a.screenshots.mkdir(exist_ok=True)
+        recording = a.run / "live/1" if a.run else drive
+        check_in_browser(a.program, a.run or run, recording, a.screenshots)
+        check_live(a.program, drive, Path(folder))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
