@@ -125,6 +125,7 @@ class Browser:
         page = self.browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
         page.on("console", lambda message: message.type == "error" and self.told.append(message.text))
         page.on("pageerror", lambda error: self.told.append(str(error)))
+        page.on("response", lambda answer: answer.status >= 400 and self.told.append(f"{answer.status} {answer.url}"))
         page.on("request", lambda request: request.url.startswith((self.url, "data:", "blob:")) or self.told.append(f"asks {request.url}"))
         page.goto(self.url + "/")
         page.wait_for_function("() => window.spartan && spartan.state().total > 0 && document.getElementById('image').naturalWidth > 0")

@@ -24,14 +24,14 @@ struct ViewArguments {
   RecordingArguments reading;
 };
 
-// With --follow the run may not have begun.
+// With --follow the run may not have begun, or have written a part of its files only.
 Result<viewer::ViewServer> open_run(const viewer::ViewRequest& request, bool follow, const Context& context) {
   bool told = false;
   for (;;) {
     auto server = viewer::ViewServer::create(request);
     const bool may_begin = follow && !server &&
                            (server.error().code == ErrorCode::input || server.error().code == ErrorCode::configuration) &&
-                           !std::filesystem::exists(RunFolder{request.run}.store());
+                           !std::filesystem::exists(RunFolder{request.run}.summary());
     if (!may_begin || interrupted()) return server;
     if (!told) context.log.info("waiting for the run to begin");
     told = true;

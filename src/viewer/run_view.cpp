@@ -116,6 +116,7 @@ Result<std::string> RunView::map() {
 
 Status RunView::open_recording_again() {
   const std::string path = request_.recording.empty() ? recording_of(folder_) : request_.recording;
+  request_.open.unfinished = true;  // that of a live run
   if (path.empty()) return failure(ErrorCode::input, "does not state its recording", folder_.path, "name it by --recording");
   auto opened = open_recording(path, request_.open);
   if (!opened) return failure(opened);

@@ -79,7 +79,12 @@ void ViewServer::State::add_routes() {
     answer(view->overview(), kJson, response);
   });
   server.Get("/api/map", [this](const httplib::Request&, httplib::Response& response) {
-    answer(view->map(), "application/octet-stream", response);
+    const auto map = view->map();
+    if (!map && map.error().code == ErrorCode::input) {
+      response.status = 204;  // no map, or not yet
+      return;
+    }
+    answer(map, "application/octet-stream", response);
   });
   server.Get("/api/frames", numbered(*view, &RunView::frames, "from", kJson));
   server.Get("/api/landmarks", numbered(*view, &RunView::landmarks, "frame", kJson));

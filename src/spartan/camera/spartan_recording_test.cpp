@@ -245,6 +245,10 @@ TEST_F(SpartanRecordingFaults, ErrorsInYamlFilesNameTheFile) {
   EXPECT_THAT(error_message(), HasSubstr("rig.yaml"));
   std::filesystem::remove(path_ + "/recording.yaml");
   EXPECT_THAT(error_message(), HasSubstr("the recording was not finished"));
+  change("rig.yaml", "bits: 99", "bits: 8");
+  OpenOptions options;
+  options.unfinished = true;
+  EXPECT_TRUE(open_recording(path_, options));
 }
 
 TEST_F(SpartanRecordingFaults, ATruncatedRowIsLeftOut) {

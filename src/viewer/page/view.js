@@ -3,7 +3,7 @@
 (() => {
   const at = id => document.getElementById(id);
   const scene = makeScene(at('scene')), plots = makePlots(at('plots'), index => show(index));
-  let run = null, frames = null, now = 0, playing = null, mapsShown = -1, shownView = -1, request = 0;
+  let run = null, frames = null, now = 0, playing = null, mapsShown = 0, shownView = -1, request = 0;
   const errors = [];
 
   const get = async (path, kind = 'json') => {
@@ -140,12 +140,9 @@
       plots.setFrames(frames);
     }
     if (run.maps !== mapsShown) {
-      try {
-        scene.setMap(await get('/api/map', 'buffer'));
-        mapsShown = run.maps;
-      } catch (error) {
-        mapsShown = -1;  // a run without a map, or not yet
-      }
+      const buffer = await get('/api/map', 'buffer');
+      if (buffer.byteLength > 0) scene.setMap(buffer);  // else it is in the next state that is committed
+      mapsShown = buffer.byteLength > 0 ? run.maps : 0;
       legend(scene.colourBy(at('colour-by').value));
     } else if (run.frames !== have) {
       legend(scene.colourBy(at('colour-by').value));

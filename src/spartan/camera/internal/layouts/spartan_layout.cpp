@@ -29,11 +29,12 @@ Result<RigChoice> rig_of(const fs::path& folder, const OpenOptions& options) {
                  "add the file, or give a calibration with --rig");
 }
 
-// Properties from recording.yaml. A list of frames that was written by hand needs none.
-Status read_properties(const fs::path& folder, bool is_complete_table, RecordingInfo& info) {
+// Properties from recording.yaml. A list of frames that was written by hand needs none, a recording that is being made has
+// none yet.
+Status read_properties(const fs::path& folder, bool may_have_none, RecordingInfo& info) {
   std::error_code error;
   if (!fs::exists(folder / "recording.yaml", error)) {
-    if (!is_complete_table) return {};
+    if (may_have_none) return {};
     return failure(ErrorCode::input, "has no recording.yaml: the recording was not finished", folder.string(),
                    "resume or repeat the recording");
   }
@@ -66,8 +67,9 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   std::error_code error;
   RecordingIndex index;
   auto table = TableReader::open((folder / "frames.csv").string(), spartan_frames_format());
-  const bool is_complete = !table || table->has_all_columns();
-  if (Status status = read_properties(folder, is_complete, index.info); !status) return failure(status);
+  const bool by_hand = table && !table->has_all_columns();
+  if (Status status = read_properties(folder, by_hand || options.unfinished, index.info); !status)
+    return failure(status);
   if (!table) {
     table.error().hint = hint_of_other_table(folder / "frames.csv");
     return failure(table);
