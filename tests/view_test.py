@@ -180,18 +180,25 @@ def check_page(page, width):
     check(unnamed == 0, f"{width} px: {unnamed} controls without a name")
 
 
+def take_screenshot(page, path, width):
+    page.evaluate("() => { const t = document.getElementById('time'); t.value = Math.floor(0.6 * t.max); t.dispatchEvent(new Event('input')); }")
+    if width < 500:  # the whole page
+        page.set_viewport_size({"width": width, "height": page.evaluate("() => document.documentElement.scrollHeight")})
+    page.wait_for_timeout(2000)
+    page.screenshot(path=path)
+
+
 def check_in_browser(program, run, recording, screenshots):
     with served(program, run, "--recording", recording) as url, sync_playwright() as playwright:
         browser = Browser(playwright, url)
         for width in (1600, 390):
             for scheme in ("light", "dark"):
-                with browser.page(width, scheme) as page:
-                    if scheme == "light":
+                if scheme == "light":
+                    with browser.page(width) as page:
                         check_page(page, width)
-                    if screenshots:
-                        page.evaluate("() => { const t = document.getElementById('time'); t.value = Math.floor(0.6 * t.max); t.dispatchEvent(new Event('input')); }")
-                        page.wait_for_timeout(1500)
-                        page.screenshot(path=screenshots / f"view_{width}_{scheme}.png", full_page=width < 500)
+                if screenshots:
+                    with browser.page(width, scheme) as page:
+                        take_screenshot(page, screenshots / f"view_{width}_{scheme}.png", width)
         check(not browser.told, f"the console tells nothing: {browser.told}")
         with browser.page(1600) as page:
             times = sorted(page.evaluate("() => spartan.scene.measure(60)"))

@@ -25,7 +25,7 @@ using testing::run_program;
 
 constexpr const char* kCommands[] = {"demo",   "run",   "stereo",   "map",        "evaluate", "rig",     "config",
                                      "export", "info",  "simulate", "completion", "man",      "convert", "design",
-                                     "dump",   "check", "inspect",  "merge",      "features", "compare"};
+                                     "dump",   "check", "inspect",  "merge",      "features", "compare", "view"};
 
 TEST(CommandLine, NamesAWordThatIsNoCommand) {
   const auto command = run_program({"fly"});
@@ -115,7 +115,7 @@ TEST(CommandLine, HelpStatesTheDefaultOfEveryOptionWithAValue) {
   int options = 0;
   for (const std::string command :
        {"demo", "run", "stereo", "map build", "map info", "map merge", "map export", "evaluate", "rig inspect",
-        "rig convert", "rig design", "features compare", "config dump", "config check", "export", "simulate"}) {
+        "rig convert", "rig design", "features compare", "config dump", "config check", "export", "simulate", "view"}) {
     std::vector<std::string> words;
     std::istringstream parts(command);
     for (std::string word; parts >> word;) words.push_back(word);
