@@ -11,7 +11,7 @@ help:
 	@echo "make recordings  the standard simulated recordings, once, into ~/.cache/spartan (an hour)"
 	@echo "make format    format the C++ files"
 	@echo "make lint      clang-tidy on what changed since the commit in .ci/lint-base (or LINT_BASE=commit, LINT_BASE=all)"
-	@echo "make docs      API reference of the public headers: build/docs/html/index.html"
+	@echo "make docs      the documentation site with the references of C++ and Python: build/docs/site/index.html"
 	@echo "make coverage  lines and branches that the fast tests reach, by module"
 	@echo "make clean     remove what was built"
 
@@ -62,10 +62,10 @@ lint:
 	scripts/lint
 
 docs:
-	./setup docs
+	./setup build test docs site
 	mkdir -p build/docs
-	doxygen docs/Doxyfile
-	@echo "open build/docs/html/index.html"
+	scripts/site --api
+	@echo "open build/docs/site/index.html"
 
 coverage:
 	./setup

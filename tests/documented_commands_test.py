@@ -89,7 +89,7 @@ def run(where, line, program, work):
     """Exits where the line fails. A view answers until it is terminated."""
     environment = {**os.environ, "HOME": str(work), "PATH": f"{Path(program).parent}:{os.environ['PATH']}"}
     if line.startswith("spartan view "):
-        line = f"timeout --preserve-status 2 {line}"
+        line = f"timeout --foreground --preserve-status 2 {line}"
     done = subprocess.run(["bash", "-o", "pipefail", "-c", line], cwd=work, env=environment, capture_output=True,
                           text=True, timeout=600)
     lost = 6 if re.match("spartan (run|demo) ", line) else 0  # for a part of the small drive

@@ -38,7 +38,7 @@ MAY_INCLUDE = {
     "testing": BASE | {"rig", "calibration_io", "camera"},
     "system": SYSTEM | {"figures", "calibration"},
     "report": SYSTEM | {"figures", "calibration", "rig_design", "eval", "system"},
-    "viewer": ALL,
+    "viewer": ALL | {"figures"},
     "program": ALL | {"viewer"},
     "python": ALL,
     "tests": ALL | {"figures", "testing"},
@@ -157,7 +157,7 @@ def faults(project):
         module = module_of(path, project)
         is_test = path.stem.endswith("_test")
         public = (path.suffix == ".h" and not is_test and not is_internal(str(path)) and
-                  module not in {"program", "python", "tests"} | PRIVATE_MODULES)
+                  module not in {"program", "viewer", "python", "tests"} | PRIVATE_MODULES)
         parts = included.split("/")
         if parts[0] == "spartan" and len(parts) > 2:
             count += 1

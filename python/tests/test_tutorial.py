@@ -20,6 +20,14 @@ def test_the_tutorial_is_true(drive, tmp_path, monkeypatch):
     assert (tmp_path / "map.png").stat().st_size > 5000
 
 
+@pytest.mark.parametrize("name", ["map_layers", "covariances"])
+def test_other_tutorials_are_true(stops_run, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my_run").symlink_to(stops_run.path)
+    failed, tried = doctest.testfile(str(SOURCE / f"docs/tutorials/{name}.md"), module_relative=False)
+    assert failed == 0 and tried >= 3
+
+
 @pytest.mark.skipif(importlib.util.find_spec("nbclient") is None, reason="nbclient is not installed")
 def test_the_notebook_runs(drive, tmp_path, monkeypatch):
     import nbclient

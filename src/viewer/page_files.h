@@ -1,16 +1,12 @@
-// The files of the page, carried in the program: those of viewer/page, and three.js.
+// The files of the page that are its own; those that draw the scene are scene_files().
 #pragma once
 
 #include <span>
-#include <string_view>
+
+#include "spartan/figures/embedded_file.h"
 
 namespace spartan::viewer {
 
-struct PageFile {
-  const char* path;  ///< of the request
-  const char* type;  ///< MIME
-  std::string_view content;
-};
-std::span<const PageFile> page_files();
+std::span<const EmbeddedFile> page_files();
 
 }  // namespace spartan::viewer

@@ -12,8 +12,7 @@
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
 #include "spartan/odometry/odometer.h"
-#include "viewer/frame_columns.h"
-#include "viewer/map_layers.h"
+#include "spartan/report/report.h"
 
 namespace spartan::viewer {
 namespace {
@@ -22,6 +21,7 @@ namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
 constexpr int kJpegQuality = 85;
+constexpr std::int64_t kMostCells = 400'000;
 
 // Changes whenever the store is written: sizes and times of the database and of its log.
 std::string version_of(const std::string& store) {
@@ -111,7 +111,7 @@ Result<std::string> RunView::map() {
   const std::lock_guard lock(mutex_);
   auto saved = SavedMap::open(folder_.path);
   if (!saved) return failure(saved);
-  return map_layers(*saved);
+  return map_layers(*saved, kMostCells);
 }
 
 Status RunView::open_recording_again() {

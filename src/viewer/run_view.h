@@ -26,10 +26,9 @@ class RunView {
 
   /// JSON: name, numbers of frames, terrain views and local maps, whether the run has ended.
   Result<std::string> overview();
-  /// JSON: an array for each quantity, of the frames from number `from` on; `t_s` counts from the first frame.
+  /// frame_columns().
   Result<std::string> frames(std::size_t from);
-  /// The global map: a JSON header with the layers and their places, padded to a multiple of four bytes, behind its
-  /// length (4 bytes, little endian); then the layers. Large maps are thinned. Code `input`: there is none.
+  /// map_layers(). Code `input`: there is no map.
   Result<std::string> map();
   /// The rectified left image of a frame as JPEG. Code `input`: there is no recording, or not this frame.
   Result<std::string> image(std::size_t frame);

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "spartan/figures/scene_files.h"
 #include "viewer/page_files.h"
 #include "viewer/run_view.h"
 
@@ -70,10 +71,12 @@ void ViewServer::State::add_routes() {
       {{"Cache-Control", "no-store"},
        {"Content-Security-Policy", "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'"},
        {"X-Content-Type-Options", "nosniff"}});
-  for (const PageFile& file : page_files()) {
-    server.Get(file.path, [&file](const httplib::Request&, httplib::Response& response) {
-      response.set_content(std::string(file.content), file.type);
-    });
+  for (const auto& files : {page_files(), internal::scene_files()}) {
+    for (const EmbeddedFile& file : files) {
+      server.Get(file.path, [&file](const httplib::Request&, httplib::Response& response) {
+        response.set_content(std::string(file.content), file.type);
+      });
+    }
   }
   server.Get("/api/run", [this](const httplib::Request&, httplib::Response& response) {
     answer(view->overview(), kJson, response);

@@ -9,7 +9,6 @@
 #include "spartan/image_io/image_io.h"
 
 namespace spartan {
-namespace {
 
 std::string base64(const std::string& bytes) {
   constexpr const char* kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -27,6 +26,8 @@ std::string base64(const std::string& bytes) {
   }
   return text;
 }
+
+namespace {
 
 std::string url_of(const Result<std::string>& png) {
   return "data:image/png;base64," + (png ? base64(*png) : std::string());

@@ -12,6 +12,9 @@ namespace spartan {
 /// Escapes the characters that are special in HTML.
 std::string html_text(const std::string& text);
 
+/// The bytes in base64 (RFC 4648).
+std::string base64(const std::string& bytes);
+
 /// "data:image/png;base64,…"; of no bytes where the image cannot be encoded.
 std::string data_url(ImageView<const Rgb8> image);
 

@@ -15,6 +15,7 @@
 #include "spartan/report/internal/map_section.h"
 #include "spartan/report/internal/page.h"
 #include "spartan/report/internal/run_section.h"
+#include "spartan/report/internal/scene_section.h"
 #include "spartan/report/internal/sensor_section.h"
 #include "spartan/report/internal/trajectory_section.h"
 #include "spartan/report/internal/truth_section.h"
@@ -118,6 +119,7 @@ Result<std::string> make_report(ReportRequest request) {
       {"Images", image_section(**source, *imager)},
       {"Trajectories",
        trajectory_section({request.run, request.truth, *frames, std::move(global_map->map), heading_east})},
+      {"Map in 3D", scene_section(request.run, *store, *frames)},
       {"Terrain", terrain_section(**source, *imager, request.run, *store)},
       {"Maps", global_map->coverage + *local_maps},
       {"Sensors", summary["health"]["localization"].empty() ? std::string() : sensor_tables(summary, *frames)},

@@ -12,34 +12,7 @@
     return kind === 'json' ? response.json() : response.arrayBuffer();
   };
 
-  // ---- legends
-
-  const key = (text, colour) => {
-    const made = document.createElement('span'), swatch = document.createElement('span');
-    made.className = 'key';
-    swatch.className = 'swatch';
-    swatch.style.background = colour;
-    made.append(swatch, text);
-    return made;
-  };
-  const units = {elevation_m: 'm', sigma_m: 'm', cost: ''};
-  const legend = span => {
-    const box = at('scene-legend'), layer = at('colour-by').value;
-    box.replaceChildren();
-    for (const [kind, colour] of Object.entries(scene.trajectories)) {
-      if (frames && frames[kind].some(p => p)) box.append(key(kind, `var(${colour})`));
-    }
-    if (frames) box.append(key('ellipses: three standard deviations of the position', 'var(--blue)'));
-    if (layer === 'class') ['', 'free', 'obstacle', 'cavity'].forEach((name, i) => name && box.append(key(name, `rgb(${scene.classes[i]})`)));
-    if (span) {
-      const made = document.createElement('span'), bar = document.createElement('span'), digits = layer === 'sigma_m' ? 4 : 2;
-      made.className = 'key';
-      bar.className = 'ramp';
-      bar.style.background = scene.rampCss();
-      made.append(`${span[0].toFixed(digits)} ${units[layer]}`, bar, `${span[1].toFixed(digits)} ${units[layer]}`);
-      box.append(made);
-    }
-  };
+  const paint = () => scene.legend(at('scene-legend'), scene.colourBy(at('colour-by').value));
 
   // ---- one moment
 
@@ -143,9 +116,9 @@
       const buffer = await get('/api/map', 'buffer');
       if (buffer.byteLength > 0) scene.setMap(buffer);  // else it is in the next state that is committed
       mapsShown = buffer.byteLength > 0 ? run.maps : 0;
-      legend(scene.colourBy(at('colour-by').value));
+      paint();
     } else if (run.frames !== have) {
-      legend(scene.colourBy(at('colour-by').value));
+      paint();
     }
     if (frames && run.frames !== have) show(have === 0 && run.ended ? 0 : wasLast ? frames.total - 1 : now);
     at('state').textContent = `${run.frames} frames, ${run.terrain.length} terrain views, ${run.maps} local maps, rig ${run.rig}${run.ended ? '' : '; the run goes on'}`;
@@ -163,7 +136,7 @@
   // ---- controls
 
   at('time').addEventListener('input', () => show(+at('time').value));
-  at('colour-by').addEventListener('change', () => legend(scene.colourBy(at('colour-by').value)));
+  at('colour-by').addEventListener('change', paint);
   at('from-above').addEventListener('click', () => scene.fromAbove());
   at('follow-rover').addEventListener('click', event => {
     const on = event.target.getAttribute('aria-pressed') !== 'true';

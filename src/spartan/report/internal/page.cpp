@@ -11,7 +11,7 @@ namespace {
 
 // Sizes of letters in plots are in their own units: larger where a plot is shown smaller.
 constexpr const char* kStyle = R"css(
-:root { --ink: #2b2320; --soft: #5c4d43; --paper: #fbf7f2; --rule: #dcc7b4; --accent: #8a330f; }
+:root { --orange: #b26a00; --light-blue: #2a7fb0; --blue: #0072b2; --purple: #a0507f; --ink: #2b2320; --soft: #5c4d43; --paper: #fbf7f2; --rule: #dcc7b4; --accent: #8a330f; }
 * { box-sizing: border-box; }
 body { font: 16px/1.5 system-ui, sans-serif; margin: 0; color: var(--ink); background: var(--paper); }
 .page { max-width: 1560px; margin: 0 auto; padding: 1rem; }
@@ -46,6 +46,11 @@ button.key:hover, button:focus-visible { border-color: var(--soft); }
 button[aria-pressed=false] { text-decoration: line-through; }
 .zoom { margin-left: auto; display: inline-flex; gap: .25rem; }
 .zoom button { font: inherit; min-width: 2rem; min-height: 1.75rem; border: 1px solid var(--rule); border-radius: 4px; background: #fff; color: var(--ink); cursor: pointer; }
+.solid > #scene { height: 60vh; min-height: 300px; background: #dfe7ee; border-radius: 4px; overflow: hidden; touch-action: none; }
+.solid .legend { margin: .4rem 0; }
+.swatch, .ramp { display: inline-block; width: 1.1rem; height: .7rem; border-radius: 2px; }
+.ramp { width: 7rem; }
+select { font: inherit; min-height: 1.75rem; }
 .readout { display: block; min-height: 1.5em; font-size: .875rem; font-variant-numeric: tabular-nums; }
 .colours { display: flex; flex-wrap: wrap; gap: .25rem .75rem; align-items: center; font-size: .875rem; }
 .colours svg { max-width: 100%; height: auto; }

@@ -1,13 +1,13 @@
-#include "viewer/frame_columns.h"
 
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "spartan/report/report.h"
 #include "spartan/system/run_folder.h"
 
-namespace spartan::viewer {
+namespace spartan {
 namespace {
 
 using Json = nlohmann::json;
@@ -99,4 +99,4 @@ std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t fr
   return columns.dump();
 }
 
-}  // namespace spartan::viewer
+}  // namespace spartan

@@ -1,5 +1,6 @@
 'use strict';
-// The terrain and the trajectories in 3D: makeScene(element) returns {setMap, setFrames, setTime, colourBy, fromAbove, follow}.
+// The terrain and the trajectories in 3D: makeScene(element) returns an object with setMap(), setFrames(),
+// setTime(), colourBy(), legend() and more.
 // World axes: x forward or east, y left or north, z up, in metres.
 (() => {
   // "cividis" (Nuñez, Anderton & Renslow, PLOS ONE 2018) at eight points: even steps of lightness, also for colour-blind readers.
@@ -15,6 +16,15 @@
   };
   const rampCss = () => `linear-gradient(to right, ${kRamp.map(c => `rgb(${c})`).join(', ')})`;
   const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+  const key = (text, colour) => {
+    const made = document.createElement('span'), swatch = document.createElement('span');
+    made.className = 'key';
+    swatch.className = 'swatch';
+    swatch.style.background = colour;
+    made.append(swatch, text);
+    return made;
+  };
 
   // The 2nd and the 98th percentile of the known values.
   const spanOf = values => {
@@ -83,6 +93,22 @@
       if (last) points.push(...last, ...next);
       last = next;
     }
+  };
+
+  // Coordinates of a line of at most some 1500 points: those that are nearer to the one before than a share of its length are
+  // left out.
+  const thinned = positions => {
+    const known = positions.filter(p => p), points = [];
+    const between = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+    let length = 0;
+    for (let i = 1; i < known.length; ++i) length += between(known[i - 1], known[i]);
+    let last = null;
+    known.forEach((p, i) => {
+      if (last && i + 1 < known.length && between(last, p) < length / 1500) return;
+      points.push(p[0], p[1], p[2] + 0.02);
+      last = p;
+    });
+    return points;
   };
 
   window.makeScene = element => {
@@ -207,8 +233,7 @@
       setFrames(columns) {
         frames = columns;
         for (const [kind, colour] of Object.entries(kTrajectories)) {
-          const points = [];
-          for (const p of columns[kind]) if (p) points.push(p[0], p[1], p[2] + 0.02);
+          const points = thinned(columns[kind]);
           if (points.length > 3) setLine(kind, points, css(colour), false, 2.5);
         }
         // At most 60 ellipses, evenly.
@@ -272,10 +297,23 @@
         }
         return times;
       },
+      // Fills an element with the keys of what is drawn; `span` as colourBy() returns it.
+      legend(box, span) {
+        box.replaceChildren();
+        for (const [kind, colour] of Object.entries(kTrajectories)) if (lines[kind]) box.append(key(kind, `var(${colour})`));
+        if (lines.ellipses) box.append(key('ellipses: three standard deviations of the position', 'var(--blue)'));
+        if (layer === 'class') ['', 'free', 'obstacle', 'cavity'].forEach((name, i) => name && box.append(key(name, `rgb(${kClasses[i]})`)));
+        if (!span) return;
+        const made = document.createElement('span'), bar = document.createElement('span');
+        const text = value => `${value.toFixed(layer === 'sigma_m' ? 4 : 2)}${layer === 'cost' ? '' : ' m'}`;
+        made.className = 'key';
+        bar.className = 'ramp';
+        bar.style.background = rampCss();
+        made.append(text(span[0]), bar, text(span[1]));
+        box.append(made);
+      },
       state: () => ({drawn, vertices: terrain ? terrain.geometry.getAttribute('position').count : 0, time: now,
         rover: marker.position.toArray(), lines: Object.keys(lines)}),
-      canvas: renderer.domElement,
-      rampCss, classes: kClasses, trajectories: kTrajectories,
     };
     resize();
     return api;

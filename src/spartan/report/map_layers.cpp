@@ -1,14 +1,14 @@
-#include "viewer/map_layers.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <vector>
 
-namespace spartan::viewer {
-namespace {
+#include "spartan/report/report.h"
 
-constexpr double kMostCells = 400'000;
+namespace spartan {
+namespace {
 
 class Layers {
  public:
@@ -53,14 +53,15 @@ class Layers {
 
 }  // namespace
 
-Result<std::string> map_layers(SavedMap& saved) {
+Result<std::string> map_layers(SavedMap& saved, std::int64_t most_cells) {
   const auto view = saved.map().view(saved.map().extent());
   if (!view) return failure(view);
   const auto request = saved.request(MapFormat::gltf);
   if (!request) return failure(request);
   const Traversability shape = view->shape(saved.options().mapping.map, ThreadPool(1));
   const Image<Rgb8> colours = cell_colours(*view, request->points);
-  Layers layers(*view, static_cast<int>(std::ceil(std::sqrt(static_cast<double>(view->window.cells()) / kMostCells))));
+  const double excess = static_cast<double>(view->window.cells()) / static_cast<double>(most_cells);
+  Layers layers(*view, std::max(1, static_cast<int>(std::ceil(std::sqrt(excess)))));
   layers.add("elevation_m", "float32", [&](int c, int r) { return view->elevation_m(c, r); });
   layers.add("sigma_m", "float32", [&](int c, int r) { return std::sqrt(view->variance_m2(c, r)); });
   layers.add("cost", "float32", [&](int c, int r) { return shape.cost(c, r); });
@@ -69,4 +70,4 @@ Result<std::string> map_layers(SavedMap& saved) {
   return layers.file();
 }
 
-}  // namespace spartan::viewer
+}  // namespace spartan
