@@ -29,9 +29,10 @@ Result<viewer::ViewServer> open_run(const viewer::ViewRequest& request, bool fol
   bool told = false;
   for (;;) {
     auto server = viewer::ViewServer::create(request);
-    const bool may_begin = follow && !server &&
-                           (server.error().code == ErrorCode::input || server.error().code == ErrorCode::configuration) &&
-                           !std::filesystem::exists(RunFolder{request.run}.summary());
+    const bool may_begin =
+        follow && !server &&
+        (server.error().code == ErrorCode::input || server.error().code == ErrorCode::configuration) &&
+        !std::filesystem::exists(RunFolder{request.run}.summary());
     if (!may_begin || interrupted()) return server;
     if (!told) context.log.info("waiting for the run to begin");
     told = true;
@@ -59,9 +60,9 @@ Result<ExitCode> view_command(const Context& context, const ViewArguments& a) {
 
 void add_view(CLI::App& app, Context& context) {
   auto a = std::make_shared<ViewArguments>();
-  CLI::App* command = add_command(
-      app, context, "view", "Show a run in a browser: images, disparities, the map in 3D, health and times",
-      "view my_run", [&context, a] { return view_command(context, *a); });
+  CLI::App* command =
+      add_command(app, context, "view", "Show a run in a browser: images, disparities, the map in 3D, health and times",
+                  "view my_run", [&context, a] { return view_command(context, *a); });
   command->add_option("run", a->run, "Run folder; a run may be going on in it.")->required();
   command->add_flag("--follow", a->follow, "Wait for the run to begin (default: it is an error if there is none).");
   command->add_option("--recording", a->recording,

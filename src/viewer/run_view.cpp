@@ -87,7 +87,8 @@ Result<std::string> RunView::overview() {
   std::error_code error;
   Json terrain = Json::array();
   for (const TerrainRecord& view : terrain_) {
-    const auto frame = std::find_if(frames_.begin(), frames_.end(), [&](const FrameRecord& f) { return f.stamp == view.stamp; });
+    const auto frame =
+        std::find_if(frames_.begin(), frames_.end(), [&](const FrameRecord& f) { return f.stamp == view.stamp; });
     terrain.push_back(frame == frames_.end() ? -1 : frame - frames_.begin());
   }
   const std::string recording = request_.recording.empty() ? recording_of(folder_) : request_.recording;
@@ -117,7 +118,8 @@ Result<std::string> RunView::map() {
 Status RunView::open_recording_again() {
   const std::string path = request_.recording.empty() ? recording_of(folder_) : request_.recording;
   request_.open.unfinished = true;  // that of a live run
-  if (path.empty()) return failure(ErrorCode::input, "does not state its recording", folder_.path, "name it by --recording");
+  if (path.empty())
+    return failure(ErrorCode::input, "does not state its recording", folder_.path, "name it by --recording");
   auto opened = open_recording(path, request_.open);
   if (!opened) return failure(opened);
   recording_ = std::move(*opened);

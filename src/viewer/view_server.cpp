@@ -111,8 +111,8 @@ Result<ViewServer> ViewServer::create(const ViewRequest& request) {
 
 Result<int> ViewServer::bind(const std::string& address, int port) {
   state_->address = address;
-  const int bound = port == 0 ? state_->server.bind_to_any_port(address)
-                              : (state_->server.bind_to_port(address, port) ? port : -1);
+  const int bound =
+      port == 0 ? state_->server.bind_to_any_port(address) : (state_->server.bind_to_port(address, port) ? port : -1);
   if (bound > 0) return bound;
   return failure(ErrorCode::output, fmt::format("port {} of {} cannot be used", port, address), "--port",
                  "another program uses it: leave --port out");

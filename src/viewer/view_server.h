@@ -1,4 +1,5 @@
-// The page that shows a run in a browser, served on this computer: images, disparities, the map in 3D, health and times.
+// The page that shows a run in a browser, served on this computer: images, disparities, the map in 3D, health and
+// times.
 #pragma once
 
 #include <memory>

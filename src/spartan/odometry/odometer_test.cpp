@@ -75,13 +75,15 @@ TEST(Odometer, TracksAreTheLandmarksOfAMotion) {
     std::vector<double> errors;
     for (const LandmarkTrack& track : odometer.tracks()) {
       const Eigen::Vector2d from = track.previous_px.cast<double>();
-      const float d = frame_of(i - 1).disparity(static_cast<int>(std::lround(from.x())), static_cast<int>(std::lround(from.y())));
+      const float d =
+          frame_of(i - 1).disparity(static_cast<int>(std::lround(from.x())), static_cast<int>(std::lround(from.y())));
       if (!track.is_inlier || std::isnan(d)) continue;
       const Eigen::Vector3d point = kCameras.triangulate(from.x(), from.y(), static_cast<double>(d));
       const Eigen::Vector3d seen = kCameras.project(true_motion(i - 1, i).inverse() * point);
       errors.push_back((seen.head<2>() - track.current_px.cast<double>()).norm());
     }
-    const auto inliers = std::count_if(odometer.tracks().begin(), odometer.tracks().end(), [](const LandmarkTrack& t) { return t.is_inlier; });
+    const auto inliers = std::count_if(odometer.tracks().begin(), odometer.tracks().end(),
+                                       [](const LandmarkTrack& t) { return t.is_inlier; });
     EXPECT_EQ(inliers, estimate.inliers);
     ASSERT_GT(errors.size(), 100U);
     std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());

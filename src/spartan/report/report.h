@@ -38,18 +38,19 @@ struct ReportRequest {
 /// as those who read run and recording.
 Result<std::string> make_report(ReportRequest request);
 
-/// The records of frames as columns of JSON, for plots: an object with an array for each quantity, of the frames from number
-/// `from` on; null where it is not known:
+/// The records of frames as columns of JSON, for plots: an object with an array for each quantity, of the frames from
+/// number `from` on; null where it is not known:
 ///   t_s since the first frame, stamp_ns (text), status, message; inliers, matches, landmarks, rms_px;
-///   pose [x, y, z, qx, qy, qz, qw] of the best trajectory, sigma_m (along x, y, z of the world), ellipse_m2 (covariance
-///   xx, xy, yy of the position); odometry, slam, localization, smoothed: [x, y, z];
-///   stages: {name: [ms]}; sensors: {name: [state]}.
+///   pose [x, y, z, qx, qy, qz, qw] of the best trajectory, sigma_m (along x, y, z of the world), ellipse_m2
+///   (covariance xx, xy, yy of the position); odometry, slam, localization, smoothed: [x, y, z]; stages: {name: [ms]};
+///   sensors: {name: [state]}.
 std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t from);
 
-/// The global map as a few arrays, for drawing in a browser: a JSON header with the layers and their places, padded to a
-/// multiple of four bytes, behind its length (4 bytes, little endian); then the layers `elevation_m`, `sigma_m`, `cost`
-/// (float32, NaN unknown), `class` (bytes, as in map files) and `colour` (three bytes a cell, of the images), in rows from
-/// the north. Maps of more cells are thinned to every second, third … row and column. Codes: those of GlobalMap::view.
+/// The global map as a few arrays, for drawing in a browser: a JSON header with the layers and their places, padded to
+/// a multiple of four bytes, behind its length (4 bytes, little endian); then the layers `elevation_m`, `sigma_m`,
+/// `cost` (float32, NaN unknown), `class` (bytes, as in map files) and `colour` (three bytes a cell, of the images), in
+/// rows from the north. Maps of more cells are thinned to every second, third … row and column. Codes: those of
+/// GlobalMap::view.
 Result<std::string> map_layers(SavedMap& saved, std::int64_t most_cells);
 
 /// The two trajectories of a comparison.

@@ -116,8 +116,8 @@ bool set_colours(GDALRasterBand& band, const std::vector<MapCategory>& categorie
   return band.SetColorTable(&colours) == CE_None;
 }
 
-// Lowest, highest, mean, standard deviation and share of the known cells, as `gdalinfo -stats` would compute them. GDAL's
-// own function fails on bands without a known cell.
+// Lowest, highest, mean, standard deviation and share of the known cells, as `gdalinfo -stats` would compute them.
+// GDAL's own function fails on bands without a known cell.
 bool set_statistics(GDALRasterBand& band, const ImageView<const float>& values) {
   double lowest = std::numeric_limits<double>::infinity(), highest = -lowest, sum = 0, squares = 0;
   std::int64_t known = 0;
@@ -159,9 +159,8 @@ class MapInMemory {
   static Image<std::uint8_t> as_bytes(const ImageView<const float>& values) {
     Image<std::uint8_t> bytes(values.width(), values.height());
     for (int y = 0; y < values.height(); ++y) {
-      std::transform(values.row(y), values.row(y) + values.width(), bytes.row(y), [](float value) {
-        return static_cast<std::uint8_t>(std::isnan(value) ? 0.F : value);
-      });
+      std::transform(values.row(y), values.row(y) + values.width(), bytes.row(y),
+                     [](float value) { return static_cast<std::uint8_t>(std::isnan(value) ? 0.F : value); });
     }
     return bytes;
   }
@@ -272,8 +271,8 @@ Status write_geotiff(const std::string& path, const GeoTransform& place, const s
                                              "OVERVIEW_RESAMPLING=NEAREST",
                                              "OVERVIEW_COMPRESS=DEFLATE",
                                              nullptr};
-    Dataset written(driver->CreateCopy(temporary.c_str(), &map.dataset(), 0, const_cast<char**>(options.data()),
-                                       nullptr, nullptr));
+    Dataset written(
+        driver->CreateCopy(temporary.c_str(), &map.dataset(), 0, const_cast<char**>(options.data()), nullptr, nullptr));
     const bool complete = written != nullptr;
     written.reset();  // writes the last blocks: a full disk is reported here
     if (complete && !errors.any() && holds(temporary, bands)) return publish(temporary, path, bands);

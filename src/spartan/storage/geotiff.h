@@ -16,12 +16,12 @@ struct MapDescription {
   std::vector<std::pair<std::string, std::string>> items = {};  ///< name and value
 };
 
-/// Writes float32 bands of equal size as a cloud-optimized GeoTIFF (tiles of 512 cells, compressed, overviews by nearest
-/// neighbour of maps of more than 512 cells a side), with nodata NaN, in a local (engineering) coordinate system in
-/// metres. Bands have their names, units, statistics and, in `path`.aux.xml, the names of their categories. A single band
-/// with categories is written as bytes with a colour table and nodata 0; NaN is then 0. Each file is written atomically,
-/// and the map is read back before it replaces an older one. Code `output` if it cannot be written, `usage` if Spartan
-/// was built without GDAL.
+/// Writes float32 bands of equal size as a cloud-optimized GeoTIFF (tiles of 512 cells, compressed, overviews by
+/// nearest neighbour of maps of more than 512 cells a side), with nodata NaN, in a local (engineering) coordinate
+/// system in metres. Bands have their names, units, statistics and, in `path`.aux.xml, the names of their categories. A
+/// single band with categories is written as bytes with a colour table and nodata 0; NaN is then 0. Each file is
+/// written atomically, and the map is read back before it replaces an older one. Code `output` if it cannot be written,
+/// `usage` if Spartan was built without GDAL.
 Status write_geotiff(const std::string& path, const GeoTransform& place, const std::vector<MapBand>& bands,
                      const MapDescription& description = {});
 /// The file beside a GeoTIFF that GDAL reads with it: names of categories.

@@ -45,9 +45,8 @@ void add_image(const Pose& world_from_camera, int camera, const std::string& nam
   const Pose camera_from_world = world_from_camera.inverse();
   const auto& t = camera_from_world.translation();
   const auto& q = camera_from_world.rotation();
-  model.images +=
-      fmt::format("{} {:.12f} {:.12f} {:.12f} {:.12f} {:.9f} {:.9f} {:.9f} {} {}\n\n", ++model.image_count, q.w(),
-                  q.x(), q.y(), q.z(), t.x(), t.y(), t.z(), camera, name);
+  model.images += fmt::format("{} {:.12f} {:.12f} {:.12f} {:.12f} {:.9f} {:.9f} {:.9f} {} {}\n\n", ++model.image_count,
+                              q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z(), camera, name);
 }
 
 // Evenly from all points. Their errors are pixels in COLMAP, which are not known here.
@@ -60,7 +59,8 @@ void add_points(const PointCloud& cloud, ColmapModel& model) {
   }
 }
 
-// The images of both cameras of a frame and their poses. A frame that can no longer be read is an error of the recording.
+// The images of both cameras of a frame and their poses. A frame that can no longer be read is an error of the
+// recording.
 Status add_frame(const FrameRecord& frame, const Pose& world_from_body, Recording& recording, Imager& imager,
                  const fs::path& folder, ColmapModel& model) {
   auto read = recording.frame_at(frame.pair, frame.stamp);

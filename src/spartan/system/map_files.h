@@ -36,8 +36,8 @@ Status write_global_map(GlobalMap& map, const MapOptions& options, std::optional
 Status remove_map_files(const std::string& path);
 
 /// figure: elevation and classes with axes, scale and legend. ply, pcd: centres of cells. octomap: a binary OcTree.
-/// gltf: a mesh of the surface (glTF 2.0, binary). ascii_grid: one layer as an ESRI ASCII grid. occupancy_grid: the YAML
-/// file of map_server (ROS) and Nav2, with an image .pgm beside it.
+/// gltf: a mesh of the surface (glTF 2.0, binary). ascii_grid: one layer as an ESRI ASCII grid. occupancy_grid: the
+/// YAML file of map_server (ROS) and Nav2, with an image .pgm beside it.
 enum class MapFormat { geotiff, figure, ply, pcd, octomap, gltf, ascii_grid, occupancy_grid };
 
 /// By the extension: .tif, .png, .ply, .pcd, .bt, .glb, .asc or .yaml. Code `usage` for others.

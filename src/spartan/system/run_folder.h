@@ -105,16 +105,17 @@ Result<ExportFormat> parse_export_format(std::string_view name);
 
 /// tum, euroc: world_from_body of every measured pose. kitti: first left optical frame from left optical frame, one
 /// line for every listed frame; a frame without a pose has the predicted one. csv: every frame with status, pose and
-/// standard deviations (empty without a pose). geotiff, gltf, octomap: the global map. ply, pcd: all terrain point clouds
-/// in one file. `kind` selects the trajectory; none: the best that the run has. Codes: `input` (no run, or a run without
-/// the requested result), `output`, `usage` (colmap).
+/// standard deviations (empty without a pose). geotiff, gltf, octomap: the global map. ply, pcd: all terrain point
+/// clouds in one file. `kind` selects the trajectory; none: the best that the run has. Codes: `input` (no run, or a run
+/// without the requested result), `output`, `usage` (colmap).
 Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
                   const ThreadPool& workers, const std::string& path);
 
-/// Writes the folder of a COLMAP project: images/left/<stamp_ns>.png and images/right/<stamp_ns>.png, rectified, of each
-/// measured pose, and sparse/0 with cameras.txt (two PINHOLE cameras), images.txt (poses, camera from world) and
+/// Writes the folder of a COLMAP project: images/left/<stamp_ns>.png and images/right/<stamp_ns>.png, rectified, of
+/// each measured pose, and sparse/0 with cameras.txt (two PINHOLE cameras), images.txt (poses, camera from world) and
 /// points3D.txt (terrain points without tracks, at most 200 000). `recording`: the one that was run, with its images.
-/// Returns the number of images. Codes: `input` (no run, no such trajectory, a frame that the recording lacks), `output`.
+/// Returns the number of images. Codes: `input` (no run, no such trajectory, a frame that the recording lacks),
+/// `output`.
 Result<int> export_colmap(const std::string& run_folder, Recording& recording, std::optional<TrajectoryKind> kind,
                           const ThreadPool& workers, const std::string& path);
 

@@ -46,7 +46,7 @@ button.key:hover, button:focus-visible { border-color: var(--soft); }
 button[aria-pressed=false] { text-decoration: line-through; }
 .zoom { margin-left: auto; display: inline-flex; gap: .25rem; }
 .zoom button { font: inherit; min-width: 2rem; min-height: 1.75rem; border: 1px solid var(--rule); border-radius: 4px; background: #fff; color: var(--ink); cursor: pointer; }
-.solid > #scene { height: 60vh; min-height: 300px; background: #dfe7ee; border-radius: 4px; overflow: hidden; touch-action: none; }
+.solid > #scene { width: 100%; aspect-ratio: 3 / 2; max-height: 700px; background: #dfe7ee; border-radius: 4px; overflow: hidden; touch-action: none; }
 .solid .legend { margin: .4rem 0; }
 .swatch, .ramp { display: inline-block; width: 1.1rem; height: .7rem; border-radius: 2px; }
 .ramp { width: 7rem; }

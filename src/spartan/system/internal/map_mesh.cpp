@@ -114,7 +114,7 @@ TerrainMesh mesh_of(const MapView& view, const Image<Rgb8>& colours) {
 }
 
 std::string glb_file(const TerrainMesh& mesh) {
-  constexpr int kVertices = 34962, kIndices = 34963;                   // targets
+  constexpr int kVertices = 34962, kIndices = 34963;                     // targets
   constexpr int kFloat = 5126, kUnsignedShort = 5123, kUnsigned = 5125;  // component types
   std::vector<std::array<std::uint16_t, 4>> colours;
   colours.reserve(mesh.colours.size());
@@ -136,7 +136,9 @@ std::string glb_file(const TerrainMesh& mesh) {
          {"rotation", {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)}},
          {"translation", {mesh.origin_m.x(), mesh.origin_m.z(), -mesh.origin_m.y()}}}}},
       {"materials",
-       {{{"name", "ground"}, {"doubleSided", true}, {"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}}}}},
+       {{{"name", "ground"},
+         {"doubleSided", true},
+         {"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}}}}},
       {"meshes",
        {{{"name", "terrain"},
          {"primitives",
@@ -153,7 +155,7 @@ std::string glb_file(const TerrainMesh& mesh) {
       {"bufferViews", views},
       {"buffers", {{{"byteLength", buffer.bytes().size()}}}}};
   std::string chunks;
-  append_chunk(chunks, json.dump(), 0x4E4F534A, ' ');       // "JSON"
+  append_chunk(chunks, json.dump(), 0x4E4F534A, ' ');      // "JSON"
   append_chunk(chunks, buffer.bytes(), 0x004E4942, '\0');  // "BIN"
   std::string file = "glTF";
   for (const std::uint32_t word : {2U, static_cast<std::uint32_t>(12 + chunks.size())})

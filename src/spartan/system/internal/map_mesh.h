@@ -24,7 +24,8 @@ struct TerrainMesh {
 /// Two triangles between four known cells, one between three.
 TerrainMesh mesh_of(const MapView& view, const Image<Rgb8>& colours);
 
-/// A binary glTF 2.0 file (.glb): one mesh with positions, normals and colours, turned to the y axis of glTF, which is up.
+/// A binary glTF 2.0 file (.glb): one mesh with positions, normals and colours, turned to the y axis of glTF, which is
+/// up.
 std::string glb_file(const TerrainMesh& mesh);
 
 }  // namespace spartan::internal

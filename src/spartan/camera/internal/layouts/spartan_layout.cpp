@@ -29,8 +29,8 @@ Result<RigChoice> rig_of(const fs::path& folder, const OpenOptions& options) {
                  "add the file, or give a calibration with --rig");
 }
 
-// Properties from recording.yaml. A list of frames that was written by hand needs none, a recording that is being made has
-// none yet.
+// Properties from recording.yaml. A list of frames that was written by hand needs none, a recording that is being made
+// has none yet.
 Status read_properties(const fs::path& folder, bool may_have_none, RecordingInfo& info) {
   std::error_code error;
   if (!fs::exists(folder / "recording.yaml", error)) {
