@@ -6,7 +6,7 @@ find_path(SPARTAN_THREE_EXAMPLES controls/OrbitControls.js PATHS /usr/share/java
 set(scene_files)
 if(SPARTAN_THREE AND SPARTAN_THREE_EXAMPLES)
   set(SPARTAN_HAS_THREE ON)
-  set(scene_files "/three.min.js=${SPARTAN_THREE}")
+  set(scene_files "/three/notice.js=${PROJECT_SOURCE_DIR}/src/spartan/figures/three_notice.js" "/three.min.js=${SPARTAN_THREE}")
   # Controls of the camera, and lines that are wider than a pixel.
   foreach(part IN ITEMS controls/OrbitControls lines/LineSegmentsGeometry lines/LineGeometry lines/LineMaterial
       lines/LineSegments2 lines/Line2)

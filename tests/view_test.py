@@ -93,6 +93,7 @@ def check_answers(program, run, recording):
         check(status == 200 and headers["Content-Type"] == "image/jpeg" and image[:2] == b"\xff\xd8", "an image")
         tracks = json_of(f"{url}/api/landmarks?frame=3")["tracks"]
         check(sum(track[4] for track in tracks) > 50, f"{len(tracks)} landmarks")
+        check(json_of(f"{url}/api/landmarks?frame=0")["tracks"] == [], "no motion to the first frame")
         status, _, disparity = get(f"{url}/api/disparity?view=0")
         stamp = frames["stamp_ns"][about["terrain"][0]]
         check(disparity == (run / f"terrain/{stamp}.png").read_bytes(), "the disparity image is the file of the run")
@@ -104,6 +105,28 @@ def check_answers(program, run, recording):
         _, headers, page = get(url + "/")
         check(b"http://" not in page and b"https://" not in page, "the page names no other computer")
         check("default-src 'self'" in headers["Content-Security-Policy"], "and may not load from one")
+
+
+def check_ports_and_ends(program, run):
+    with served(program, run) as url:
+        port = url.rsplit(":", 1)[1]
+        other = subprocess.run([program, "view", str(run), "--port", port], capture_output=True, text=True, timeout=30)
+        check(other.returncode == 5 and "--port" in other.stderr, f"a port in use: {other.returncode} {other.stderr}")
+        body = urllib.request.Request(f"{url}/api/run", data=bytes(10**6), method="POST")
+        try:
+            urllib.request.urlopen(body, timeout=30)
+            check(False, "a request with a body is refused")
+        except (urllib.error.HTTPError, urllib.error.URLError, ConnectionError):
+            pass
+    for delay in (0, 0.02, 0.05, 0.1, 0.2, 0.4):
+        view = subprocess.Popen([program, "view", str(run), "-q"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(delay)
+        view.send_signal(2)
+        check(view.wait(timeout=10) in (0, 130, -2), f"an interrupt after {delay} s ends it: {view.returncode}")
+    with served(program, run, "--address", "0.0.0.0") as url:
+        status = get(url.replace("0.0.0.0", "127.0.0.2") + "/api/run")[0]
+        check(status == 200, f"another address of this computer: {status}")
+        check(get(url.replace("0.0.0.0", "127.0.0.1") + "/api/run", Host="evil.example")[0] == 403, "names are refused there, too")
 
 
 def check_bad_input(program, folder):
@@ -147,11 +170,14 @@ def pixels_of(page, selector):
 
 
 def check_page(page, width):
-    """A list of what is asserted is in docs/benchmarks/view.md."""
+    """A list of what is asserted is in docs/benchmarks/python.md."""
     total = page.evaluate("() => spartan.state().total")
+    page.wait_for_function("() => spartan.scene.state().vertices > 0")
+    for _ in range(50):  # it is drawn in the browser's next frame
+        if pixels_of(page, "#scene canvas") > 50:
+            break
+        page.wait_for_timeout(100)
     check(pixels_of(page, "#scene canvas") > 50, f"{width} px: the scene is not blank")
-    page.wait_for_function("() => document.getElementById('landmarks').width > 1")
-    check(pixels_of(page, "#landmarks") > 1, f"{width} px: landmarks are drawn")
     check(page.evaluate("() => document.documentElement.scrollWidth <= window.innerWidth"), f"{width} px: nothing is wider")
     check(page.evaluate("() => spartan.plots.count()") > 5, f"{width} px: plots")
     blank = page.evaluate("""() => [...document.querySelectorAll('.plot canvas')].filter(c =>
@@ -164,6 +190,8 @@ def check_page(page, width):
     check(page.evaluate("() => spartan.state().now") == total - 1, f"{width} px: the slider moves by keyboard")
     check(page.evaluate("() => spartan.scene.state().rover") != before, f"{width} px: and the rover with it")
     check(f"{total} of {total}" in page.inner_text("#frame"), f"{width} px: the frame is named")
+    page.wait_for_function("() => document.getElementById('image-note').textContent.includes('inliers')")
+    check(pixels_of(page, "#landmarks") > 1, f"{width} px: landmarks are drawn")
     page.keyboard.press("Home")
     drawn = page.evaluate("() => spartan.scene.state().drawn")
     for layer in ("elevation_m", "class", "cost", "sigma_m", "colour"):
@@ -256,6 +284,7 @@ def main():
     drive, run = a.small_runs / "drive", a.small_runs / "drive_run"
     with tempfile.TemporaryDirectory() as folder:
         check_answers(a.program, run, drive)
+        check_ports_and_ends(a.program, run)
         check_bad_input(a.program, Path(folder))
         if sync_playwright is None or CHROMIUM is None:
             print("not tried: Chromium or Playwright is not installed (./setup docs)")

@@ -58,8 +58,9 @@ void export_to(MapValue& map, const PathText& path, const std::optional<Window>&
   check(map.use([&](SavedMap& saved) -> Status {
     const auto format = map_format_of(path);
     if (!format) return failure(format);
-    const auto request = saved.request(*format, layers);
-    return request ? export_map(view_of(saved, wanted), *request, ThreadPool(1), path) : Status(failure(request));
+    const MapView view = view_of(saved, wanted);
+    const auto request = saved.request(view, *format, layers);
+    return request ? export_map(view, *request, ThreadPool(1), path) : Status(failure(request));
   }));
 }
 

@@ -68,6 +68,9 @@ void bind_recordings(nb::module_& m) {
       "Stereo frames and sensor samples of a recording in order of time, whatever its layout. Each "
       "iteration begins at the start; only the latest iterator may be used.")
       .def_prop_ro("rig", [](const RecordingValue& r) { return r.info->rig; })
+      .def_prop_ro(
+          "rig_source", [](const RecordingValue& r) { return r.info->rig_source; },
+          "The file that the rig was read from; self-masks are relative to its folder.")
       .def_prop_ro("name", [](const RecordingValue& r) { return r.info->name; })
       .def_prop_ro("format", [](const RecordingValue& r) { return std::string(name_of(r.info->format)); })
       .def_prop_ro(

@@ -62,9 +62,17 @@ std::string run_input(const RunRequest& request, const RunHooks& hooks, double s
   return value_of(std::move(outcome)).summary_json;
 }
 
+// Of the module logging.
+int level_of(LogLevel level) {
+  constexpr int kDebug = 10, kInfo = 20, kWarning = 30, kError = 40;
+  if (level == LogLevel::debug) return kDebug;
+  if (level == LogLevel::info) return kInfo;
+  return level == LogLevel::warning ? kWarning : kError;
+}
+
 std::string run_folder(const PathText& input, const PathText& output, const RunOptions* options,
                        const OpenOptions& open, RunRequest request, double speed, const nb::object& progress,
-                       const nb::object& frame) {
+                       const nb::object& frame, const nb::object& log) {
   request.input = input;
   request.output = output;
   request.open = open;
@@ -77,7 +85,9 @@ std::string run_folder(const PathText& input, const PathText& output, const RunO
   request.version = SPARTAN_VERSION;
   PythonHooks python;
   RunHooks hooks;
-  hooks.log = Log::to_terminal(LogLevel::warning);
+  hooks.log = Log::to_function([&](LogLevel level, std::string_view text) {
+    python.call([&] { log(level_of(level), nb::str(text.data(), text.size())); });
+  });
   hooks.should_stop = [&python] { return python.should_stop(); };
   if (!progress.is_none()) {
     hooks.progress = [&](const RunProgress& p) { python.call([&] { progress(p); }); };
@@ -120,7 +130,7 @@ void bind_runs(nb::module_& m) {
       [](const PathText& input, const PathText& output, const RunOptions* options, const std::optional<PathText>& rig,
          const std::optional<std::string>& format, const std::optional<std::string>& left,
          const std::optional<std::string>& right, double fps, std::optional<int> threads, int max_frames, bool resume,
-         bool replace, double speed, const nb::object& progress, const nb::object& frame) {
+         bool replace, double speed, const nb::object& progress, const nb::object& frame, const nb::object& log) {
         if (max_frames < 0) throw nb::value_error("max_frames: must not be negative");
         RunRequest request;
         request.threads = thread_count(threads);
@@ -129,12 +139,12 @@ void bind_runs(nb::module_& m) {
         request.replace = replace;
         request.record = true;  // of a live stream
         return run_folder(input, output, options, open_options(rig, format, left, right, fps), request, speed, progress,
-                          frame);
+                          frame, log);
       },
       "input"_a, "output"_a, "options"_a.none() = nb::none(), nb::kw_only(), "rig"_a = nb::none(),
       "format"_a = nb::none(), "left"_a = nb::none(), "right"_a = nb::none(), "fps"_a = 0.0, "threads"_a = nb::none(),
       "max_frames"_a = 0, "resume"_a = false, "replace"_a = false, "speed"_a = 1.0, "progress"_a = nb::none(),
-      "frame"_a = nb::none(), "See spartan.run(). Returns the text of summary.json.");
+      "frame"_a = nb::none(), "log"_a, "See spartan.run(). Returns the text of summary.json.");
   m.def("write_report", report, "run"_a, "recording"_a, "page"_a, "truth"_a = nb::none(), "threads"_a = nb::none(),
         "Writes the report page of a run folder.");
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -131,6 +132,8 @@ def run(
     progress, frame: called after each frame. An exception that one raises ends the run; so does Ctrl-C. What was done
         is in the folder, and `resume=True` goes on.
 
+    Messages go to the logger `spartan` of the module logging, which prints warnings where nothing else is configured.
+
     Raises Error, e.g. with the code `input` (no usable recording), `configuration` or `output`.
     """
     _core.run_into_folder(
@@ -149,6 +152,7 @@ def run(
         speed=speed,
         progress=progress,
         frame=frame,
+        log=logging.getLogger("spartan").log,
     )
     finished = Run(output)
     if report:

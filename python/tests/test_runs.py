@@ -2,7 +2,9 @@
 
 import filecmp
 import gc
+import logging
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -312,3 +314,33 @@ def test_a_folder_with_the_name_of_a_scenario_is_not_meant(tmp_path, monkeypatch
     with pytest.raises(spartan.Error) as raised:
         spartan.simulate("quick", "drive", set=["samples=3"])
     assert raised.value.code == "configuration" and "samples" in str(raised.value)
+
+
+def test_messages_go_to_logging(drive, tmp_path, caplog):
+    folder = tmp_path / "drive"
+    shutil.copytree(drive, folder)
+    (folder / "image_0/000003.png").write_bytes(b"")
+    with caplog.at_level(logging.DEBUG, logger="spartan"):
+        run = spartan.run(folder, tmp_path / "run")
+    levels = {record.levelname for record in caplog.records if record.name == "spartan"}
+    assert {"INFO", "WARNING"} <= levels
+    assert any("000003.png" in record.getMessage() for record in caplog.records)
+    logged = (run.path / "log.txt").read_text(encoding="utf-8")
+    assert all(record.getMessage() in logged for record in caplog.records if record.levelno >= logging.INFO)
+
+
+def test_a_logger_that_raises_ends_the_run(drive, tmp_path):
+    class Refuses(logging.Handler):
+        def handle(self, record):
+            raise ValueError("no more")
+
+    logger, handler = logging.getLogger("spartan"), Refuses()
+    logger.addHandler(handler)
+    level = logger.level
+    logger.setLevel(logging.INFO)
+    try:
+        with pytest.raises(ValueError, match="no more"):
+            spartan.run(drive, tmp_path / "run")
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(level)

@@ -3,14 +3,14 @@
 #include <memory>
 
 #include "program/commands.h"
-#include "program/recording_arguments.h"
+#include "spartan/camera/recording.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan::program {
 namespace {
 
 struct ExportArguments {
-  std::string run, format, output, trajectory, recording;
+  std::string run, format, output, trajectory, recording, rig;
   bool list = false;
 };
 
@@ -26,7 +26,10 @@ Result<ExitCode> list_formats() {
 Result<ExitCode> export_images(const Context& context, const ExportArguments& arguments,
                                std::optional<TrajectoryKind> kind, const ThreadPool& workers) {
   if (Status s = expect_new_folder(context, arguments.output); !s) return failure(s);
-  auto recording = open_recording(arguments.recording);
+  OpenOptions options;
+  options.rig_file = arguments.rig;
+  options.unfinished = true;  // what a live run that was killed has recorded
+  auto recording = open_recording(arguments.recording, options);
   if (!recording) return failure(recording);
   const auto images = export_colmap(arguments.run, **recording, kind, workers, arguments.output);
   if (!images) return failure(images);
@@ -46,6 +49,8 @@ Result<ExitCode> export_command(const Context& context, const ExportArguments& a
   const ThreadPool workers(context.threads);
   if (*format == ExportFormat::colmap && !arguments.recording.empty())
     return export_images(context, arguments, kind, workers);
+  if (!arguments.recording.empty())
+    return failure(ErrorCode::usage, "is of --format colmap only", "--recording", "leave it out");
   if (Status s = expect_new_file(context, arguments.output); !s) return failure(s);
   if (Status s = export_run(arguments.run, *format, kind, workers, arguments.output); !s) return failure(s);
   return kDone;
@@ -69,7 +74,9 @@ void add_export(CLI::App& app, Context& context) {
                    "Trajectory: odometry, slam or localization (default: the last of these that exists), or smoothed.")
       ->check(CLI::IsMember({"odometry", "slam", "localization", "smoothed"}));
   command->add_option("--recording", a->recording,
-                      "Recording that was run, whose images colmap needs (default: none); of a live run RUN/live/1.");
+                      "Recording that was run, whose images colmap needs (default: none); of a live run RUN/live/1, "
+                      "and after a resume the next number. Its layout is detected.");
+  command->add_option("--rig", a->rig, "Calibration file of the recording (default: the recording's own).");
   add_force_flag(*command, context);
   add_threads_option(*command, context);
 }

@@ -66,7 +66,7 @@ Status write_map(SavedMap& saved, const MapExportArguments& a, const Context& co
   const auto view = saved.map().view(*window);
   if (!view) return failure(view);
   if (!knows_a_cell(*view)) context.log.warning("--window: no cell of it is known");
-  const auto request = saved.request(*format, a.layers);
+  const auto request = saved.request(*view, *format, a.layers);
   return request ? export_map(*view, *request, ThreadPool(context.threads), a.output) : Status(failure(request));
 }
 

@@ -29,10 +29,11 @@ Result<viewer::ViewServer> open_run(const viewer::ViewRequest& request, bool fol
   bool told = false;
   for (;;) {
     auto server = viewer::ViewServer::create(request);
+    std::error_code error;
     const bool may_begin =
         follow && !server &&
         (server.error().code == ErrorCode::input || server.error().code == ErrorCode::configuration) &&
-        !std::filesystem::exists(RunFolder{request.run}.summary());
+        !std::filesystem::exists(RunFolder{request.run}.summary(), error);
     if (!may_begin || interrupted()) return server;
     if (!told) context.log.info("waiting for the run to begin");
     told = true;
@@ -47,7 +48,8 @@ Result<ExitCode> view_command(const Context& context, const ViewArguments& a) {
   if (!server) return interrupted() ? Result<ExitCode>(kInterrupted) : failure(server);
   const auto port = server->bind(a.address, a.port);
   if (!port) return failure(port);
-  if (Status s = print(fmt::format("http://{}:{}/\n", a.address, *port)); !s) return failure(s);
+  const std::string host = a.address.find(':') == std::string::npos ? a.address : "[" + a.address + "]";
+  if (Status s = print(fmt::format("http://{}:{}/\n", host, *port)); !s) return failure(s);
   std::thread answers([&server] { server->serve(); });
   while (!interrupted()) std::this_thread::sleep_for(50ms);
   server->stop();

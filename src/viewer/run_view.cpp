@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -35,14 +34,19 @@ std::string version_of(const std::string& store) {
   return text;
 }
 
-// As the summary of a run that has ended states it, else what a live run records.
-std::string recording_of(const RunFolder& folder) {
-  std::error_code error;
-  if (fs::exists(folder.recording(1), error)) return folder.recording(1);
+// An empty object before a run has written one.
+Json summary_of(const RunFolder& folder) {
   const auto text = read_file(folder.summary());
-  if (!text) return "";
-  const Json summary = Json::parse(*text, nullptr, false);
-  const std::string input = summary.is_object() ? summary.value("input", "") : "";
+  Json summary = text ? Json::parse(*text, nullptr, false) : Json::object();
+  return summary.is_object() ? summary : Json::object();
+}
+
+// What the summary of a run states; empty where it is not there.
+std::string input_of(const RunFolder& folder) {
+  const Json summary = summary_of(folder);
+  const std::string input =
+      summary.contains("input") && summary["input"].is_string() ? summary["input"].get<std::string>() : "";
+  std::error_code error;
   return fs::exists(input, error) ? input : "";
 }
 
@@ -74,6 +78,10 @@ Status RunView::refresh() {
   if (!terrain) return failure(terrain);
   auto maps = store->maps();
   if (!maps) return failure(maps);
+  const auto tiles = store->tiles().index();
+  if (!tiles) return failure(tiles);
+  map_version_ = 0;
+  for (const auto& tile : *tiles) map_version_ = std::max(map_version_, tile.revision);
   frames_ = std::move(*frames);
   terrain_ = std::move(*terrain);
   maps_ = std::move(*maps);
@@ -81,24 +89,37 @@ Status RunView::refresh() {
   return {};
 }
 
+// The summary of a run that was resumed is that of its first part: the store has more frames.
+bool RunView::has_ended() const {
+  const Json summary = summary_of(folder_);
+  if (!summary.contains("frames") || !summary["frames"].is_number_unsigned()) return false;
+  auto frames = summary["frames"].get<std::size_t>();
+  if (summary.contains("skipped") && summary["skipped"].is_object()) {
+    for (const auto& [reason, count] : summary["skipped"].items())
+      frames += count.is_number_unsigned() ? count.get<std::size_t>() : 0;
+  }
+  return frames_.size() <= frames;
+}
+
 Result<std::string> RunView::overview() {
   const std::lock_guard lock(mutex_);
   if (Status s = refresh(); !s) return failure(s);
-  std::error_code error;
+  const bool ended = has_ended();
   Json terrain = Json::array();
   for (const TerrainRecord& view : terrain_) {
-    const auto frame =
-        std::find_if(frames_.begin(), frames_.end(), [&](const FrameRecord& f) { return f.stamp == view.stamp; });
-    terrain.push_back(frame == frames_.end() ? -1 : frame - frames_.begin());
+    const auto frame = std::lower_bound(frames_.begin(), frames_.end(), view.stamp,
+                                        [](const FrameRecord& f, const Stamp& stamp) { return f.stamp < stamp; });
+    const bool found = frame != frames_.end() && frame->stamp == view.stamp;
+    terrain.push_back(found ? frame - frames_.begin() : -1);
   }
-  const std::string recording = request_.recording.empty() ? recording_of(folder_) : request_.recording;
   return Json{{"name", fs::path(folder_.path).lexically_normal().filename().string()},
               {"rig", rig_.name},
               {"frames", frames_.size()},
               {"terrain", terrain},
               {"maps", maps_.size()},
-              {"has_images", !recording.empty()},
-              {"ended", fs::exists(folder_.summary(), error)}}
+              {"map_version", map_version_},
+              {"has_images", !recording_folders().empty()},
+              {"ended", ended}}
       .dump();
 }
 
@@ -115,15 +136,31 @@ Result<std::string> RunView::map() {
   return map_layers(*saved, kMostCells);
 }
 
-Status RunView::open_recording_again() {
-  const std::string path = request_.recording.empty() ? recording_of(folder_) : request_.recording;
-  request_.open.unfinished = true;  // that of a live run
-  if (path.empty())
+// The one that was named, else those that a live run has recorded, else that of the summary.
+std::vector<std::string> RunView::recording_folders() const {
+  if (!request_.recording.empty()) return {request_.recording};
+  std::vector<std::string> folders;
+  std::error_code error;
+  for (int number = 1; fs::exists(folder_.recording(number), error); ++number)
+    folders.push_back(folder_.recording(number));
+  if (const std::string input = input_of(folder_); folders.empty() && !input.empty()) folders.push_back(input);
+  return folders;
+}
+
+Status RunView::open_recordings() {
+  const std::vector<std::string> folders = recording_folders();
+  if (folders.empty())
     return failure(ErrorCode::input, "does not state its recording", folder_.path, "name it by --recording");
-  auto opened = open_recording(path, request_.open);
-  if (!opened) return failure(opened);
-  recording_ = std::move(*opened);
-  const std::string masks = fs::path(recording_->info().rig_source).parent_path().string();
+  request_.open.unfinished = true;  // the last one of a live run
+  recordings_are_complete_ = has_ended();
+  recordings_.clear();
+  for (const std::string& folder : folders) {
+    auto opened = open_recording(folder, request_.open);
+    if (!opened) return failure(opened);
+    recordings_.push_back(std::move(*opened));
+  }
+  if (imager_) return {};
+  const std::string masks = fs::path(recordings_.front()->info().rig_source).parent_path().string();
   auto imager = Imager::create(rig_, options_.imaging, ThreadPool(1), masks);
   if (!imager) return failure(imager);
   imager_ = std::move(*imager);
@@ -134,11 +171,16 @@ Status RunView::open_recording_again() {
 Result<StereoFrame> RunView::frame_at(std::size_t frame) {
   if (frame >= frames_.size()) return no_such("frame", frame, folder_.path);
   const FrameRecord& record = frames_[frame];
-  if (recording_) {
-    if (auto found = recording_->frame_at(record.pair, record.stamp)) return found;
-  }
-  if (Status s = open_recording_again(); !s) return failure(s);
-  return recording_->frame_at(record.pair, record.stamp);
+  const auto find = [&]() -> Result<StereoFrame> {
+    Result<StereoFrame> found = no_such("image of frame", frame, folder_.path);
+    for (auto recording = recordings_.rbegin(); recording != recordings_.rend() && !found; ++recording)
+      found = (*recording)->frame_at(record.pair, record.stamp);
+    return found;
+  };
+  auto found = find();
+  if (found || recordings_are_complete_) return found;
+  if (Status s = open_recordings(); !s) return failure(s);
+  return find();
 }
 
 Result<std::string> RunView::image(std::size_t frame) {
@@ -155,7 +197,7 @@ Result<std::string> RunView::landmarks(std::size_t frame) {
   const std::lock_guard lock(mutex_);
   auto odometer = Odometer::create(options_.odometry, ThreadPool(1));
   if (!odometer) return failure(odometer);
-  for (const std::size_t number : {frame == 0 ? 0 : frame - 1, frame}) {
+  for (std::size_t number = frame == 0 ? 0 : frame - 1; number <= frame; ++number) {
     const auto read = frame_at(number);
     if (!read) return failure(read);
     const auto pair = imager_->process(*read);

@@ -24,7 +24,8 @@ class RunView {
  public:
   static Result<std::unique_ptr<RunView>> open(const ViewRequest& request);
 
-  /// JSON: name, numbers of frames, terrain views and local maps, whether the run has ended.
+  /// JSON: name, numbers of frames, terrain views and local maps, the version of the global map (0: there is none),
+  /// whether the run has ended.
   Result<std::string> overview();
   /// frame_columns().
   Result<std::string> frames(std::size_t from);
@@ -42,7 +43,9 @@ class RunView {
   RunView(const ViewRequest& request, RunFolder folder, Rig rig, RunOptions options)
       : request_(request), folder_(std::move(folder)), rig_(std::move(rig)), options_(std::move(options)) {}
   Status refresh();
-  Status open_recording_again();
+  bool has_ended() const;
+  std::vector<std::string> recording_folders() const;
+  Status open_recordings();
   Result<StereoFrame> frame_at(std::size_t frame);
 
   ViewRequest request_;
@@ -54,7 +57,9 @@ class RunView {
   std::vector<FrameRecord> frames_;
   std::vector<TerrainRecord> terrain_;
   std::vector<MapRecord> maps_;
-  std::unique_ptr<Recording> recording_;
+  std::int64_t map_version_ = 0;
+  std::vector<std::unique_ptr<Recording>> recordings_;  // a live run that was resumed has several
+  bool recordings_are_complete_ = false;  // opened after the run had ended
   std::optional<Imager> imager_;
 };
 

@@ -4,9 +4,12 @@
 #include <httplib.h>
 
 #include <algorithm>
+#include <atomic>
 #include <charconv>
+#include <chrono>
 #include <cstddef>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "spartan/figures/scene_files.h"
@@ -22,8 +25,12 @@ constexpr const char* kJson = "application/json";
 // A page of another site may have a name that leads here (DNS rebinding): it is not answered.
 bool names_this_computer(const httplib::Request& request, const std::string& address) {
   std::string host = request.get_header_value("Host");
-  host.resize(std::min(host.size(), host.rfind(':')));
-  return host == "localhost" || host == "127.0.0.1" || host == address;
+  const std::size_t port = host.rfind(':');
+  if (port != std::string::npos && host.find(']', port) == std::string::npos) host.resize(port);
+  const bool is_local = address == "127.0.0.1" || address == "localhost" || address == "::1";
+  if (host == "localhost" || host == "127.0.0.1" || host == "[::1]") return true;
+  // Of another address only numbers: rebinding needs a name.
+  return !is_local && (host.starts_with('[') || host.find_first_not_of("0123456789.") == std::string::npos);
 }
 
 void answer(const Result<std::string>& content, const char* type, httplib::Response& response) {
@@ -56,11 +63,19 @@ struct ViewServer::State {
   std::unique_ptr<RunView> view;
   httplib::Server server;
   std::string address;
+  std::atomic<bool> has_served = false;  // serve() has returned
 
   void add_routes();
 };
 
 void ViewServer::State::add_routes() {
+  server.set_payload_max_length(1024);  // no request has a body
+  server.set_keep_alive_timeout(1);     // an idle page does not keep stop() waiting
+  // Without SO_REUSEPORT, which cpp-httplib sets: two views must not share a port.
+  server.set_socket_options([](socket_t socket) {
+    const int yes = 1;
+    ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
+  });
   server.set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
     if (names_this_computer(request, address)) return httplib::Server::HandlerResponse::Unhandled;
     response.status = 403;
@@ -82,12 +97,7 @@ void ViewServer::State::add_routes() {
     answer(view->overview(), kJson, response);
   });
   server.Get("/api/map", [this](const httplib::Request&, httplib::Response& response) {
-    const auto map = view->map();
-    if (!map && map.error().code == ErrorCode::input) {
-      response.status = 204;  // no map, or not yet
-      return;
-    }
-    answer(map, "application/octet-stream", response);
+    answer(view->map(), "application/octet-stream", response);
   });
   server.Get("/api/frames", numbered(*view, &RunView::frames, "from", kJson));
   server.Get("/api/landmarks", numbered(*view, &RunView::landmarks, "frame", kJson));
@@ -120,10 +130,16 @@ Result<int> ViewServer::bind(const std::string& address, int port) {
 
 void ViewServer::serve() {
   state_->server.listen_after_bind();
+  state_->has_served = true;
 }
 
+// Of a server that does not serve yet, stop() of cpp-httplib does nothing.
 void ViewServer::stop() {
-  state_->server.stop();
+  using namespace std::chrono_literals;
+  while (!state_->has_served) {
+    state_->server.stop();
+    std::this_thread::sleep_for(10ms);
+  }
 }
 
 }  // namespace spartan::viewer

@@ -29,7 +29,7 @@ class ViewServer {
 
   /// Binds to a port of `address`; 0: any that is free. Returns the port. Code `output`: it is in use.
   Result<int> bind(const std::string& address, int port);
-  /// Answers until stop(), which another thread may call.
+  /// Answers until stop(), which another thread calls, once.
   void serve();
   void stop();
 

@@ -29,7 +29,7 @@ def _log_map(rr: Any, out: Any, run: Run) -> None:
     try:
         view = run.map().view()
     except Error as error:
-        if error.code != "input":  # a run by odometry alone has no map
+        if error.code not in ("input", "usage"):  # a run by odometry alone has no map; too large for one view
             raise
         return
     heights, colours = view["elevation_m"], view.render()
@@ -49,7 +49,9 @@ def _log_map(rr: Any, out: Any, run: Run) -> None:
 
 
 def _log_frames(rr: Any, out: Any, run: Run, recording: _core.Recording | None) -> None:
-    imager = _core.Imager(run.rig, run.options.imaging, threads=1, mask_folder=run.path) if recording is not None else None
+    imager = None
+    if recording is not None:
+        imager = _core.Imager(run.rig, run.options.imaging, threads=1, mask_folder=Path(recording.rig_source).parent)
     for record in run.frames:
         out.set_time("stamp", timestamp=np.datetime64(record.stamp_ns, "ns"))
         out.set_time("frame", sequence=record.frame_id)
@@ -63,7 +65,7 @@ def _log_frames(rr: Any, out: Any, run: Run, recording: _core.Recording | None) 
         out.log("map/base_link", rr.Transform3D(translation=pose.translation, mat3x3=pose.rotation))
         sigma = np.sqrt(np.maximum(0, np.diag(best.covariance)[:3]))
         out.log("map/base_link/three_sigma", rr.Ellipsoids3D(centers=[[0, 0, 0]], half_sizes=[3 * sigma]))
-        if recording is not None and imager is not None:
+        if recording is not None and imager is not None and not record.fault:  # both images are there
             _log_image(rr, out, recording, imager, record)
 
 
@@ -79,13 +81,14 @@ def _log_image(rr: Any, out: Any, recording: _core.Recording, imager: _core.Imag
 
 
 def _log_terrain(rr: Any, out: Any, run: Run) -> None:
-    folder = run.path / "terrain"
+    folder, numbers = run.path / "terrain", {record.stamp_ns: record.frame_id for record in run.frames}
     for stamp in run.terrain_stamps_ns:
         if not (folder / f"{stamp}.ply").exists():  # the disk was full
             continue
         cloud = _core.PointCloud.load(folder / f"{stamp}.ply")
         step = -(-len(cloud) // _MOST_POINTS) or 1
         out.set_time("stamp", timestamp=np.datetime64(stamp, "ns"))
+        out.set_time("frame", sequence=numbers[stamp])
         out.log("map/terrain", rr.Points3D(cloud.positions[::step], colors=cloud.colours[::step]))
 
 

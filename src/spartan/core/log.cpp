@@ -1,10 +1,13 @@
 #include "spartan/core/log.h"
 
 #include <spdlog/logger.h>
+#include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 
 #include <cstdlib>
+#include <mutex>
+#include <utility>
 #include <vector>
 
 namespace spartan {
@@ -35,6 +38,24 @@ std::shared_ptr<spdlog::sinks::sink> terminal_sink(LogLevel level) {
   return sink;
 }
 
+LogLevel from_spdlog(spdlog::level::level_enum level) {
+  if (level <= spdlog::level::debug) return LogLevel::debug;
+  if (level == spdlog::level::info) return LogLevel::info;
+  return level == spdlog::level::warn ? LogLevel::warning : LogLevel::error;
+}
+
+class FunctionSink final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  explicit FunctionSink(std::function<void(LogLevel, std::string_view)> function) : function_(std::move(function)) {}
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    function_(from_spdlog(message.level), {message.payload.data(), message.payload.size()});
+  }
+  void flush_() override {}
+  std::function<void(LogLevel, std::string_view)> function_;
+};
+
 }  // namespace
 
 struct Log::Sink {
@@ -49,6 +70,13 @@ struct Log::Sink {
 Log Log::to_terminal(LogLevel level) {
   Log log;
   log.sink_ = std::make_shared<Sink>(std::vector<spdlog::sink_ptr>{terminal_sink(level)});
+  return log;
+}
+
+Log Log::to_function(std::function<void(LogLevel, std::string_view)> function) {
+  Log log;
+  log.sink_ =
+      std::make_shared<Sink>(std::vector<spdlog::sink_ptr>{std::make_shared<FunctionSink>(std::move(function))});
   return log;
 }
 

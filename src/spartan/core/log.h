@@ -1,6 +1,7 @@
-// Logging to standard error and to a file.
+// Logging to standard error, to a file, or to a function.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -15,6 +16,8 @@ class Log {
   Log() = default;
   /// Messages of at least `level` to standard error.
   static Log to_terminal(LogLevel level);
+  /// All messages to a function, which may be called by any thread, one call at a time.
+  static Log to_function(std::function<void(LogLevel, std::string_view)> function);
   /// This log with an additional file sink (appended, level `info` and above). If the file cannot be opened, the result
   /// equals this log.
   Log with_file(const std::string& path) const;

@@ -1,4 +1,4 @@
-// Files that are carried in the program: scripts and styles of pages.
+// Files that are part of the program: scripts and styles of pages.
 #pragma once
 
 #include <string_view>

@@ -126,7 +126,7 @@
     controls.screenSpacePanning = false;
     const marker = rover(), lines = {}, limits = {};
     scene.add(marker);
-    let terrain = null, map = null, layer = 'colour', framed = false, following = false, asked = false, frames = null, now = 0;
+    let terrain = null, map = null, layer = 'colour', framed = false, mapFramed = false, following = false, asked = false, frames = null, now = 0;
     let drawn = 0;
 
     const draw = () => {
@@ -149,6 +149,7 @@
     };
     new ResizeObserver(resize).observe(element);
     controls.addEventListener('change', ask);
+    element.addEventListener('pointerdown', () => element.focus());  // which OrbitControls prevents
     element.addEventListener('keydown', event => {
       const by = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
       if (!by) return;
@@ -224,8 +225,8 @@
         terrain.userData = {cells};
         scene.add(terrain);
         const span = paint();
-        if (!framed) {
-          framed = true;
+        if (!mapFramed) {
+          mapFramed = framed = true;
           frameAll(new THREE.Vector3(-0.7, -0.7, 0.8));
         }
         return span;
@@ -242,7 +243,10 @@
           if (columns.pose[i]) ellipsePoints(columns.ellipse_m2[i], [columns.pose[i][0], columns.pose[i][1], columns.pose[i][2] + 0.02], points);
         }
         if (points.length > 0) setLine('ellipses', points, css('--blue'), true, 1.2);
-        if (!framed && !terrain && columns.pose.length > 1) frameAll(new THREE.Vector3(-0.7, -0.7, 0.8));
+        if (!framed && !terrain && columns.pose.length > 1) {
+          framed = true;  // once: then the camera is the user's, until there is a map
+          frameAll(new THREE.Vector3(-0.7, -0.7, 0.8));
+        }
         ask();
       },
       setTime(index) {

@@ -56,17 +56,16 @@ class Layers {
 Result<std::string> map_layers(SavedMap& saved, std::int64_t most_cells) {
   const auto view = saved.map().view(saved.map().extent());
   if (!view) return failure(view);
-  const auto request = saved.request(MapFormat::gltf);
-  if (!request) return failure(request);
+  const auto colours = saved.cell_colours(*view);
+  if (!colours) return failure(colours);
   const Traversability shape = view->shape(saved.options().mapping.map, ThreadPool(1));
-  const Image<Rgb8> colours = cell_colours(*view, request->points);
   const double excess = static_cast<double>(view->window.cells()) / static_cast<double>(most_cells);
   Layers layers(*view, std::max(1, static_cast<int>(std::ceil(std::sqrt(excess)))));
   layers.add("elevation_m", "float32", [&](int c, int r) { return view->elevation_m(c, r); });
   layers.add("sigma_m", "float32", [&](int c, int r) { return std::sqrt(view->variance_m2(c, r)); });
   layers.add("cost", "float32", [&](int c, int r) { return shape.cost(c, r); });
   layers.add("class", "uint8", [&](int c, int r) { return static_cast<std::uint8_t>(view->kind(c, r)); });
-  layers.add("colour", "rgb8", [&](int c, int r) { return colours(c, r); });
+  layers.add("colour", "rgb8", [&](int c, int r) { return (*colours)(c, r); });
   return layers.file();
 }
 

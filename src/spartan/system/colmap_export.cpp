@@ -127,7 +127,7 @@ Result<int> export_colmap(const std::string& run_folder, Recording& recording, s
   add_cameras(imager->geometry(frames->front().pair), model);
   for (const FrameRecord& frame : *frames) {
     const auto pose = pose_of(frame, *chosen);
-    if (!pose) continue;
+    if (!pose || !frame.fault.empty()) continue;  // an image of the frame is missing
     if (Status s = add_frame(frame, pose->pose, recording, *imager, path, model); !s) return failure(s);
   }
   const auto terrain = store->terrain();

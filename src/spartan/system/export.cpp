@@ -99,7 +99,7 @@ Status export_whole_map(const std::string& run_folder, MapFormat format, const T
   if (!saved) return failure(saved);
   const auto view = saved->map().view(saved->map().extent());
   if (!view) return failure(view);
-  const auto request = saved->request(format);
+  const auto request = saved->request(*view, format);
   return request ? export_map(*view, *request, workers, path) : Status(failure(request));
 }
 

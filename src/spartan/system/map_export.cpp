@@ -14,6 +14,7 @@
 #include "spartan/image_io/image_io.h"
 #include "spartan/reconstruction/point_cloud.h"
 #include "spartan/reconstruction/rendering.h"
+#include "spartan/system/internal/cell_colours.h"
 #include "spartan/system/internal/map_description.h"
 #include "spartan/system/internal/map_grids.h"
 #include "spartan/system/internal/map_mesh.h"
@@ -76,6 +77,15 @@ Status write_layers(const MapView& view, const MapExport& request, const ThreadP
   return write_file_atomically(path, ascii_grid(bands->front(), view.place()));
 }
 
+Status write_mesh(const MapView& view, const MapExport& request, const std::string& path) {
+  const bool by_images = request.colours.width() == view.window.width && request.colours.height() == view.window.height;
+  const Image<Rgb8> by_elevation = by_images ? Image<Rgb8>() : CellColours(view).image(view);
+  const TerrainMesh mesh = mesh_of(view, by_images ? request.colours : by_elevation);
+  if (mesh.triangles.empty())
+    return failure(ErrorCode::input, "has no surface: no three neighbouring cells are known", path);
+  return write_file_atomically(path, glb_file(mesh));
+}
+
 }  // namespace
 
 std::map<std::int32_t, Stamp> stamps_of(const GlobalMap& map) {
@@ -120,7 +130,7 @@ Status export_map(const MapView& view, const MapExport& request, const ThreadPoo
       return octree ? write_file_atomically(path, *octree) : Status(failure(octree));
     }
     case MapFormat::gltf:
-      return write_file_atomically(path, glb_file(mesh_of(view, cell_colours(view, request.points))));
+      return write_mesh(view, request, path);
     case MapFormat::occupancy_grid:
       return write_occupancy_map(view, path);
   }

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "spartan/core/result.h"
-#include "spartan/reconstruction/point_cloud.h"
 #include "spartan/reconstruction/stop_mapper.h"
 #include "spartan/slam/global_map.h"
 #include "spartan/system/run_options.h"
@@ -49,12 +48,8 @@ struct MapExport {
   std::vector<std::string> layers = {};  ///< names of the bands of a GeoTIFF or grid; empty: all, or elevation_m
   MapOptions options = {};               ///< of the slopes and costs
   MapContext about = {};
-  PointCloud points = {};  ///< of the ground, world frame: colours of a mesh; without them it is coloured by elevation
+  Image<Rgb8> colours = {};  ///< of the cells of a mesh; empty: by elevation and class
 };
-
-/// Colours of the cells: the mean of the points in each cell; cells without a point are light gray. Without any points
-/// they are coloured by elevation and class, as in render_map(). Size of the view.
-Image<Rgb8> cell_colours(const MapView& view, const PointCloud& points);
 
 /// The stops of a global map as MapContext has them.
 std::map<std::int32_t, Stamp> stamps_of(const GlobalMap& map);
@@ -80,14 +75,16 @@ class SavedMap {
   const RunOptions& options() const { return options_; }
   /// The stops of the map, and where its x axis points if the run has stated it.
   MapContext about() const;
-  /// To export a part of it, with the options of the run. Code `input` (a damaged point cloud, for meshes).
-  Result<MapExport> request(MapFormat format, std::vector<std::string> layers = {}) const;
+  /// Colours of the cells of a view by the images of the run: the mean of the terrain points in each cell, of at most
+  /// 200 views spread over the run; cells without a point are light gray. Without any point (a map file, or a run
+  /// without terrain views or their files) by elevation and class, as in render_map(). Code `store_damaged`.
+  Result<Image<Rgb8>> cell_colours(const MapView& view) const;
+  /// To export `view` of it, with the options of the run. Code: cell_colours().
+  Result<MapExport> request(const MapView& view, MapFormat format, std::vector<std::string> layers = {}) const;
 
  private:
   explicit SavedMap(RunOptions options) : options_(std::move(options)) {}
   static Result<SavedMap> open_run(const std::string& path);
-  // The point clouds of the run, in the colours of its images. Empty: a map file, or a run without them.
-  Result<PointCloud> points() const;
 
   RunOptions options_;
   std::string terrain_folder_;  // of a run

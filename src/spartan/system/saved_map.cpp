@@ -3,11 +3,15 @@
 #include <utility>
 
 #include "spartan/core/files.h"
+#include "spartan/system/internal/cell_colours.h"
 #include "spartan/system/internal/terrain_files.h"
 #include "spartan/system/map_files.h"
 #include "spartan/system/run_folder.h"
 
 namespace spartan {
+
+using namespace internal;
+
 namespace {
 
 // As the summary states it; none before a run has written one.
@@ -27,17 +31,27 @@ MapContext SavedMap::about() const {
   return {x_is_east_, stamps_of(file_ ? file_->map() : *run_map_)};
 }
 
-Result<PointCloud> SavedMap::points() const {
-  if (!run_store_) return PointCloud();
+Result<Image<Rgb8>> SavedMap::cell_colours(const MapView& view) const {
+  constexpr std::size_t kMostClouds = 200;
+  CellColours colours(view);
+  if (!run_store_) return colours.image(view);
   const auto terrain = run_store_->terrain();
   if (!terrain) return failure(terrain);
-  return terrain->empty() ? PointCloud() : internal::terrain_cloud(terrain_folder_, *terrain);
+  const std::size_t step = (terrain->size() + kMostClouds - 1) / kMostClouds;
+  for (std::size_t i = 0; i < terrain->size(); i += step) {
+    // Clouds that were removed, or that a full disk did not take, are left out.
+    if (const auto cloud = terrain_cloud(terrain_folder_, {(*terrain)[i]})) colours.add(*cloud);
+  }
+  return colours.image(view);
 }
 
-Result<MapExport> SavedMap::request(MapFormat format, std::vector<std::string> layers) const {
-  auto coloured = format == MapFormat::gltf ? points() : Result<PointCloud>();
-  if (!coloured) return failure(coloured);
-  return MapExport{format, std::move(layers), options_.mapping.map, about(), std::move(*coloured)};
+Result<MapExport> SavedMap::request(const MapView& view, MapFormat format, std::vector<std::string> layers) const {
+  MapExport request{format, std::move(layers), options_.mapping.map, about(), {}};
+  if (format != MapFormat::gltf) return request;
+  auto colours = cell_colours(view);
+  if (!colours) return failure(colours);
+  request.colours = std::move(*colours);
+  return request;
 }
 
 Result<SavedMap> SavedMap::open_run(const std::string& path) {

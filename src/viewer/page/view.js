@@ -2,8 +2,10 @@
 // Asks for the run, shows it, and, while it goes on, asks again every second.
 (() => {
   const at = id => document.getElementById(id);
-  const scene = makeScene(at('scene')), plots = makePlots(at('plots'), index => show(index));
-  let run = null, frames = null, now = 0, playing = null, mapsShown = 0, shownView = -1, request = 0;
+  const hasWebGl = Boolean(document.createElement('canvas').getContext('webgl'));
+  if (!hasWebGl) at('scene').textContent = 'This browser does not draw in 3D (WebGL).';
+  const scene = hasWebGl ? makeScene(at('scene')) : new Proxy({}, {get: () => () => null}), plots = makePlots(at('plots'), index => show(index));
+  let run = null, frames = null, now = 0, playing = null, mapShown = 0, shownView = -1, request = 0;
   const errors = [];
 
   const get = async (path, kind = 'json') => {
@@ -44,6 +46,7 @@
     }
     const image = at('image');
     image.src = `/api/image?frame=${index}`;
+    at('landmarks').width = 1;  // no landmarks of another frame
     try {
       await image.decode();
     } catch (error) {
@@ -51,7 +54,6 @@
       return;
     }
     if (mine !== request) return;
-    at('landmarks').width = 1;
     at('image-note').textContent = '';
     if (!at('show-landmarks').checked || playing) return;
     try {
@@ -66,8 +68,13 @@
     let view = -1;
     run.terrain.forEach((frame, i) => { if (frame >= 0 && frame <= index) view = i; });
     at('disparity-panel').classList.toggle('hidden', run.terrain.length === 0);
-    if (view === shownView || view < 0) return;
+    if (view === shownView) return;
     shownView = view;
+    if (view < 0) {
+      at('disparity').removeAttribute('src');
+      at('disparity-note').textContent = 'There is no terrain view before this frame.';
+      return;
+    }
     at('disparity').src = `/api/disparity?view=${view}`;
     at('disparity-note').textContent = `Terrain view ${view + 1} of ${run.terrain.length}, at ${frames.t_s[run.terrain[view]].toFixed(2)} s. Near is red, unknown black.`;
   };
@@ -101,36 +108,47 @@
     frames.total = more.total;
     return frames;
   };
+  const showMap = async () => {
+    if (run.map_version === mapShown) return;
+    try {
+      scene.setMap(await get('/api/map', 'buffer'));
+      mapShown = run.map_version;
+      at('scene-note').textContent = '';
+    } catch (error) {  // too large for one image, for example
+      at('scene-note').textContent = `No map: ${error.message}`;
+    }
+    paint();
+  };
+  // When a run ends, its smoothed trajectory changes frames that are here already: all are asked for again.
   const refresh = async () => {
+    const went = run && !run.ended;
     run = await get('/api/run');
     document.title = `Spartan: ${run.name}`;
     at('name').textContent = run.name;
-    const have = frames ? frames.total : 0, wasLast = !frames || now === frames.total - 1;
-    if (run.frames !== have) {
-      frames = append(await get(`/api/frames?from=${run.frames > have ? have : 0}`));
+    at('state').textContent = `${run.frames} frames, ${run.terrain.length} terrain views, ${run.maps} local maps, rig ${run.rig}${run.ended ? '' : '; the run goes on'}`;
+    const have = frames ? frames.total : 0, first = have === 0, last = frames && now === frames.total - 1;
+    const again = run.frames < have || (went && run.ended);
+    if (run.frames !== have || again) {
+      frames = append(await get(`/api/frames?from=${again ? 0 : have}`));
       at('time').max = frames.total - 1;
       scene.setFrames(frames);
       plots.setFrames(frames);
-    }
-    if (run.maps !== mapsShown) {
-      const buffer = await get('/api/map', 'buffer');
-      if (buffer.byteLength > 0) scene.setMap(buffer);  // else it is in the next state that is committed
-      mapsShown = buffer.byteLength > 0 ? run.maps : 0;
-      paint();
-    } else if (run.frames !== have) {
+      if (frames.total > 0) show(first ? (run.ended ? 0 : frames.total - 1) : last ? frames.total - 1 : Math.min(now, frames.total - 1));
       paint();
     }
-    if (frames && run.frames !== have) show(have === 0 && run.ended ? 0 : wasLast ? frames.total - 1 : now);
-    at('state').textContent = `${run.frames} frames, ${run.terrain.length} terrain views, ${run.maps} local maps, rig ${run.rig}${run.ended ? '' : '; the run goes on'}`;
+    await showMap();
   };
+  // An ended run is asked for until all of it is here.
   const follow = async () => {
+    let complete = false;
     try {
       await refresh();
+      complete = run.ended && frames && frames.total === run.frames;
     } catch (error) {
       errors.push(error.message);
       at('state').textContent = `Not answered: ${error.message}`;
     }
-    if (!run || !run.ended) setTimeout(follow, 1000);
+    if (!complete) setTimeout(follow, 1000);
   };
 
   // ---- controls
@@ -156,6 +174,6 @@
     scene.repaint();
     plots.repaint();
   });
-  window.spartan = {scene, plots, errors, state: () => ({now, total: frames ? frames.total : 0, mapsShown})};  // for tests
+  window.spartan = {scene, plots, errors, state: () => ({now, total: frames ? frames.total : 0, mapShown})};  // for tests
   follow();
 })();

@@ -33,8 +33,9 @@ Result<CameraPlugin> load_camera_plugin(bool aravis) {
   const auto library =
       aravis ? PluginLibrary::load("libspartan_aravis.so", "SPARTAN_ARAVIS", "GenICam cameras need",
                                    "install spartan-cameras (a plugin from another place needs libaravis-0.8-0)")
-             : PluginLibrary::load("libspartan_gstreamer.so", "SPARTAN_GSTREAMER", "pipelines of GStreamer need",
-                                   "install spartan-cameras (a plugin from another place needs libgstreamer-plugins-base1.0-0)");
+             : PluginLibrary::load(
+                   "libspartan_gstreamer.so", "SPARTAN_GSTREAMER", "pipelines of GStreamer need",
+                   "install spartan-cameras (a plugin from another place needs libgstreamer-plugins-base1.0-0)");
   if (!library) return failure(library);
   CameraPlugin plugin;
   for (const Status& found :
