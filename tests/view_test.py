@@ -173,7 +173,7 @@ def check_page(page, width):
     """A list of what is asserted is in docs/benchmarks/python.md."""
     total = page.evaluate("() => spartan.state().total")
     page.wait_for_function("() => spartan.scene.state().vertices > 0")
-    for _ in range(50):  # it is drawn in the browser's next frame
+    for _ in range(300):  # it is drawn in the browser's next frame
         if pixels_of(page, "#scene canvas") > 50:
             break
         page.wait_for_timeout(100)

@@ -89,7 +89,8 @@ Status RunView::refresh() {
   return {};
 }
 
-// The summary of a run that was resumed is that of its first part: the store has more frames.
+// Where a run was resumed the store has more frames than the summary, which is of its first part; where it is just ending the
+// frames that were read here may be fewer.
 bool RunView::has_ended() const {
   const Json summary = summary_of(folder_);
   if (!summary.contains("frames") || !summary["frames"].is_number_unsigned()) return false;
@@ -98,7 +99,7 @@ bool RunView::has_ended() const {
     for (const auto& [reason, count] : summary["skipped"].items())
       frames += count.is_number_unsigned() ? count.get<std::size_t>() : 0;
   }
-  return frames_.size() <= frames;
+  return frames_.size() == frames;
 }
 
 Result<std::string> RunView::overview() {
