@@ -173,11 +173,13 @@ def check_page(page, width):
     """A list of what is asserted is in docs/benchmarks/python.md."""
     total = page.evaluate("() => spartan.state().total")
     page.wait_for_function("() => spartan.scene.state().vertices > 0")
+    colours = 0
     for _ in range(300):  # it is drawn in the browser's next frame
-        if pixels_of(page, "#scene canvas") > 50:
+        colours = pixels_of(page, "#scene canvas")
+        if colours > 50:
             break
         page.wait_for_timeout(100)
-    check(pixels_of(page, "#scene canvas") > 50, f"{width} px: the scene is not blank")
+    check(colours > 50, f"{width} px: the scene is blank, {colours} colours")
     check(page.evaluate("() => document.documentElement.scrollWidth <= window.innerWidth"), f"{width} px: nothing is wider")
     check(page.evaluate("() => spartan.plots.count()") > 5, f"{width} px: plots")
     blank = page.evaluate("""() => [...document.querySelectorAll('.plot canvas')].filter(c =>

@@ -89,8 +89,8 @@ Status RunView::refresh() {
   return {};
 }
 
-// Where a run was resumed the store has more frames than the summary, which is of its first part; where it is just ending the
-// frames that were read here may be fewer.
+// Where a run was resumed the store has more frames than the summary, which is of its first part; where it is just
+// ending the frames that were read here may be fewer.
 bool RunView::has_ended() const {
   const Json summary = summary_of(folder_);
   if (!summary.contains("frames") || !summary["frames"].is_number_unsigned()) return false;
@@ -187,6 +187,7 @@ Result<StereoFrame> RunView::frame_at(std::size_t frame) {
 Result<std::string> RunView::image(std::size_t frame) {
   const std::lock_guard lock(mutex_);
   const auto read = frame_at(frame);
+  if (!read && frame < frames_.size() && !recordings_are_complete_) return std::string();  // not on disk yet
   if (!read) return failure(read);
   const auto pair = imager_->process(*read);
   if (!pair) return failure(pair);

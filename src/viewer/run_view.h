@@ -31,7 +31,8 @@ class RunView {
   Result<std::string> frames(std::size_t from);
   /// map_layers(). Code `input`: there is no map.
   Result<std::string> map();
-  /// The rectified left image of a frame as JPEG. Code `input`: there is no recording, or not this frame.
+  /// The rectified left image of a frame as JPEG; empty where a live run has not recorded it yet. Code `input`: there
+  /// is no recording, or not this frame.
   Result<std::string> image(std::size_t frame);
   /// JSON: the landmarks by which the motion to this frame was measured, in the rectified left image. They are searched
   /// anew, from this frame and the one before.
@@ -59,7 +60,7 @@ class RunView {
   std::vector<MapRecord> maps_;
   std::int64_t map_version_ = 0;
   std::vector<std::unique_ptr<Recording>> recordings_;  // a live run that was resumed has several
-  bool recordings_are_complete_ = false;  // opened after the run had ended
+  bool recordings_are_complete_ = false;                // opened after the run had ended
   std::optional<Imager> imager_;
 };
 

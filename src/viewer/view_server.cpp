@@ -34,7 +34,10 @@ bool names_this_computer(const httplib::Request& request, const std::string& add
 }
 
 void answer(const Result<std::string>& content, const char* type, httplib::Response& response) {
-  if (content) return response.set_content(*content, type);
+  if (content) {
+    response.status = content->empty() ? 204 : 200;
+    return response.set_content(*content, type);
+  }
   response.status = content.error().code == ErrorCode::input ? 404 : 500;
   response.set_content(content.error().message(), "text/plain; charset=utf-8");
 }

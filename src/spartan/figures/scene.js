@@ -145,7 +145,8 @@
       for (const line of Object.values(lines)) line.material.resolution.set(width, height);
       camera.aspect = width / height;
       camera.updateProjectionMatrix();
-      ask();
+      renderer.render(scene, camera);  // at once: the new size has cleared the canvas
+      ++drawn;
     };
     new ResizeObserver(resize).observe(element);
     controls.addEventListener('change', ask);

@@ -50,7 +50,9 @@
     try {
       await image.decode();
     } catch (error) {
-      if (mine === request) at('image-note').textContent = 'This frame has no image.';
+      if (mine !== request) return;
+      at('image-note').textContent = 'This frame has no image.';
+      if (!run.ended) setTimeout(() => mine === request && showImage(index), 1000);  // it may not be on disk yet
       return;
     }
     if (mine !== request) return;
@@ -125,7 +127,6 @@
     run = await get('/api/run');
     document.title = `Spartan: ${run.name}`;
     at('name').textContent = run.name;
-    at('state').textContent = `${run.frames} frames, ${run.terrain.length} terrain views, ${run.maps} local maps, rig ${run.rig}${run.ended ? '' : '; the run goes on'}`;
     const have = frames ? frames.total : 0, first = have === 0, last = frames && now === frames.total - 1;
     const again = run.frames < have || (went && run.ended);
     if (run.frames !== have || again) {
@@ -136,6 +137,7 @@
       if (frames.total > 0) show(first ? (run.ended ? 0 : frames.total - 1) : last ? frames.total - 1 : Math.min(now, frames.total - 1));
       paint();
     }
+    at('state').textContent = `${run.frames} frames, ${run.terrain.length} terrain views, ${run.maps} local maps, rig ${run.rig}${run.ended ? '' : '; the run goes on'}`;
     await showMap();
   };
   // An ended run is asked for until all of it is here.
