@@ -54,6 +54,20 @@ std::vector<FrameRecord> some_of(const std::vector<FrameRecord>& frames) {
   return some;
 }
 
+// JSON without "<", so that no text of a run ends the element that holds it.
+std::string escaped(const std::string& json) {
+  std::string text;
+  text.reserve(json.size());
+  for (const char c : json) {
+    if (c == '<') {
+      text += "\\u003c";
+    } else {
+      text += c;
+    }
+  }
+  return text;
+}
+
 // Data of a page, as text that the parser of HTML leaves alone.
 std::string data_element(const char* id, const std::string& text) {
   return std::string("<script type=\"text/plain\" id=\"") + id + "\">" + text + "</script>\n";
@@ -71,7 +85,7 @@ Result<std::string> scene_section(const std::string& run, RunStore& store, const
   const auto map = map_layers(*saved, kMostSceneCells);
   if (!map) return failure(map);
   std::string html = kFigure + data_element("scene-map", base64(*map)) +
-                     data_element("scene-frames", frame_columns(some_of(frames), 0));
+                     data_element("scene-frames", escaped(frame_columns(some_of(frames), 0)));
   for (const EmbeddedFile& file : scene_files()) html += "<script>" + std::string(file.content) + "</script>\n";
   return html + "<script>" + kSceneScript + "</script>\n";
 }
