@@ -30,6 +30,12 @@ def drive_run(small_runs: Path) -> spartan.Run:
     return spartan.Run(small_runs / "drive_run")
 
 
+def heights_above(world, points):
+    """Heights of points above the free ground of a map; those elsewhere are left out."""
+    samples = [(z, world.at(x, y)) for x, y, z in points]
+    return [z - sample.elevation_m for z, sample in samples if sample is not None and sample.kind == "free"]
+
+
 @pytest.fixture(scope="session")
 def stops(small_runs: Path) -> Path:
     """A simulated recording with stops and all sensors."""

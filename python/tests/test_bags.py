@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import spartan
+from conftest import heights_above
 
 bags = pytest.importorskip("spartan.bags")
 from rosbags.highlevel import AnyReader  # noqa: E402
@@ -188,10 +189,7 @@ def test_point_clouds_lie_on_the_map(drive_run, tmp_path):
         values = np.array(cloud.data).view(np.float32).reshape(-1, cloud.point_step // 4)
         assert cloud.header.frame_id == "base_link" and len(values) == cloud.width
         points = poses[_import._stamp(cloud)] @ values[::7, :3].astype(np.float64)
-        for x, y, z in points:
-            sample = world.at(x, y)
-            if sample is not None and sample.kind == "free":
-                differences.append(z - sample.elevation_m)
+        differences += heights_above(world, points)
     assert len(differences) > 200
     assert abs(np.median(differences)) < 0.01 and np.percentile(np.abs(differences), 90) < 0.05
 

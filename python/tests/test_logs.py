@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import spartan
+from conftest import heights_above
 
 bags = pytest.importorskip("spartan.bags")
 mcap_reader = pytest.importorskip("mcap.reader")
@@ -93,10 +94,7 @@ def test_clouds_lie_on_the_map(drive_run, decoded):
         rows = np.frombuffer(cloud.data, np.uint8).reshape(-1, cloud.point_stride)
         assert (rows[:, 15] == 255).all() and (rows[:, 12] == rows[:, 13]).all() and len(np.unique(rows[:, 12])) > 20
         points = poses[stamp] @ rows[:, :12].copy().view(np.float32).astype(float)
-        for x, y, z in points[::7]:
-            sample = world.at(x, y)
-            if sample is not None and sample.kind == "free":
-                differences.append(z - sample.elevation_m)
+        differences += heights_above(world, points[::7])
     assert len(differences) > 200
     assert abs(np.median(differences)) < 0.01 and np.percentile(np.abs(differences), 90) < 0.05
 
