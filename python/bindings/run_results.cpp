@@ -98,6 +98,15 @@ nb::dict sensors(const FrameRecord& frame) {
   return states;
 }
 
+nb::dict innovations(const FrameRecord& frame) {
+  nb::dict tests;
+  if (!frame.localization) return tests;
+  for (const auto& sensor : frame.localization->sensors) {
+    if (sensor.test) tests[sensor.name.c_str()] = nb::cast(*sensor.test);
+  }
+  return tests;
+}
+
 nb::dict times(const FrameRecord& frame) {
   nb::dict milliseconds;
   for (const StageTime& time : frame.times) milliseconds[time.stage.c_str()] = time.wall_ms;
@@ -127,6 +136,10 @@ void bind_records(nb::module_& m) {
       .def_ro("smoothed", &FrameRecord::smoothed, "world_from_body, UncertainPose; None before the end of the run.")
       .def_prop_ro("sensors", sensors, nb::sig("def sensors(self) -> dict[str, tuple[str, str]]"),
                    "State and reason of each sensor of the localization.")
+      .def_prop_ro("innovations", innovations, nb::sig("def innovations(self) -> dict[str, InnovationTest]"),
+                   "The last test since the frame before, of each sensor of the localization that was tested.")
+      .def_ro("latency_ms", &FrameRecord::latency_ms,
+              "Of a live run: from the arrival of the images to the pose; None of a recording.")
       .def_prop_ro("times_ms", times, nb::sig("def times_ms(self) -> dict[str, float]"), "Wall time of each stage, ms.")
       .def("__repr__", [](const FrameRecord& f) {
         return fmt::format("<FrameRecord {} at {} s: {}>", f.frame_id, to_decimal_seconds(f.stamp), f.status);

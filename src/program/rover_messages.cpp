@@ -55,8 +55,10 @@ std::string health_message(const FrameRecord& frame) {
   json["inliers"] = frame.motion.inliers;
   Json sensors = Json::object();
   if (frame.localization) {
-    for (const LocalizationRecord::Sensor& sensor : frame.localization->sensors)
+    for (const LocalizationRecord::Sensor& sensor : frame.localization->sensors) {
       sensors[sensor.name] = {{"state", sensor.state}, {"reason", sensor.reason}};
+      if (sensor.test) sensors[sensor.name].update({{"nis", sensor.test->nis}, {"gate", sensor.test->gate}});
+    }
   }
   json["sensors"] = sensors;
   json["wheel_slip"] = frame.localization ? number(frame.localization->slip) : Json(nullptr);

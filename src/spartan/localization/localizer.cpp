@@ -16,7 +16,7 @@ using namespace internal;
 
 namespace {
 
-constexpr std::uint32_t kStateVersion = 8;
+constexpr std::uint32_t kStateVersion = 9;
 
 }  // namespace
 

@@ -81,12 +81,21 @@ struct RefusalCounts {
   void count(Refusal refusal);
 };
 
+/// Chi-square test of an innovation: the measurement may be used where `nis` is at most `gate`.
+struct InnovationTest {
+  Stamp stamp;     ///< of the state that it was tested against
+  double nis = 0;  ///< normalized innovation squared, rᵀ S⁻¹ r; at most the largest double
+  double gate = 0;
+};
+
 /// Report on a sensor at a time.
 struct SensorHealth {
   SensorState state = SensorState::missing;
   std::string reason;                   ///< empty if the state is ok
   std::int64_t used = 0, rejected = 0;  ///< by the filter
   RefusalCounts refused;                ///< before the filter
+  /// The last one. Of vision: against the prediction by the IMU; none where there is no such prediction.
+  std::optional<InnovationTest> test;
 };
 
 /// Monitors one sensor by gating: ok → suspect at the first rejection, excluded after `excluded_after` consecutive
@@ -100,6 +109,7 @@ struct SensorMonitor {
   double limit = 0;
   std::int64_t used = 0, rejected = 0;
   int passed_in_row = 0, failed_in_row = 0;
+  std::optional<InnovationTest> test;  ///< the last one
 
   void see(Stamp stamp);
   /// Returns whether the sample is used: it passes the gate and the sensor is not, or no longer, excluded.

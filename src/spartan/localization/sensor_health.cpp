@@ -3,6 +3,13 @@
 #include "spartan/localization/localizer.h"
 
 namespace spartan {
+namespace {
+
+std::string text_of(double nis) {
+  return nis < 1e9 ? fmt::format("{:.1f}", nis) : fmt::format("{:.1e}", nis);
+}
+
+}  // namespace
 
 std::string_view name_of(LocalizationSensor sensor) {
   switch (sensor) {
@@ -108,6 +115,7 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
   health.used = used;
   health.rejected = rejected;
   health.refused = refusals;
+  health.test = test;
   HealthReason why = reason;
   if (health.state == SensorState::missing) why = seen ? HealthReason::silent : HealthReason::never_seen;
   switch (why) {
@@ -115,10 +123,10 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
       break;
     case HealthReason::disagrees:
       health.reason =
-          fmt::format("disagrees with the other sensors: NIS {:.1f} above the chi-square gate of {:.1f}", nis, limit);
+          fmt::format("disagrees with the other sensors: NIS {} above the chi-square gate of {:.1f}", text_of(nis), limit);
       break;
     case HealthReason::slips:
-      health.reason = fmt::format("the wheels slip: NIS {:.1f} above the chi-square gate of {:.1f}", nis, limit);
+      health.reason = fmt::format("the wheels slip: NIS {} above the chi-square gate of {:.1f}", text_of(nis), limit);
       break;
     case HealthReason::frozen:
       health.reason = "readings are frozen (identical values)";
@@ -128,7 +136,7 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
       break;
     case HealthReason::contradicted:
       health.reason =
-          fmt::format("contradicts visual odometry: NIS {:.1f} above the chi-square gate of {:.1f}", nis, limit);
+          fmt::format("contradicts visual odometry: NIS {} above the chi-square gate of {:.1f}", text_of(nis), limit);
       break;
     case HealthReason::not_aligned:
       health.reason = "its readings fit the motions by vision with no biases and direction of gravity";
@@ -138,7 +146,7 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
       break;
     case HealthReason::outvoted:
       health.reason = fmt::format(
-          "contradicts the IMU and the wheels, which agree: NIS {:.1f} above the gate of {:.1f}", nis, limit);
+          "contradicts the IMU and the wheels, which agree: NIS {} above the gate of {:.1f}", text_of(nis), limit);
       break;
     case HealthReason::implausible:
       health.reason = "its motion is far off what those before it predict, and no other sensor confirms it";

@@ -69,9 +69,9 @@ void fill_up(Json& table, std::size_t frames) {
 }  // namespace
 
 std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t from) {
-  Json columns{{"from", from}, {"total", frames.size()}, {"stages", Json::object()}, {"sensors", Json::object()}};
+  Json columns{{"from", from}, {"total", frames.size()}, {"stages", Json::object()}, {"sensors", Json::object()}, {"innovations", Json::object()}};
   for (const char* name : {"t_s", "stamp_ns", "status", "message", "inliers", "matches", "landmarks", "rms_px", "pose",
-                           "sigma_m", "ellipse_m2", "odometry", "slam", "localization", "smoothed"})
+                           "sigma_m", "ellipse_m2", "latency_ms", "odometry", "slam", "localization", "smoothed"})
     columns[name] = Json::array();
   for (std::size_t i = from; i < frames.size(); ++i) {
     const FrameRecord& frame = frames[i];
@@ -83,6 +83,7 @@ std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t fr
     columns["matches"].push_back(frame.motion.matches);
     columns["landmarks"].push_back(frame.motion.landmarks);
     columns["rms_px"].push_back(rounded(frame.motion.rms_px, 1e-3));
+    columns["latency_ms"].push_back(frame.latency_ms ? Json(rounded(*frame.latency_ms, 1e-3)) : Json(nullptr));
     add_best(frame, columns);
     for (const TrajectoryKind kind : kTrajectories)
       columns[std::string(name_of(kind))].push_back(position(pose_of(frame, kind)));
@@ -91,11 +92,17 @@ std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t fr
       if (!is_part) add_named(columns["stages"], time.stage, rounded(time.wall_ms, 1e-3), i - from);
     }
     if (!frame.localization) continue;
-    for (const LocalizationRecord::Sensor& sensor : frame.localization->sensors)
+    for (const LocalizationRecord::Sensor& sensor : frame.localization->sensors) {
       add_named(columns["sensors"], sensor.name, sensor.state, i - from);
+      if (!sensor.test || !(sensor.test->gate > 0)) continue;
+      constexpr double kMost = 1e6;  // the quotient of a singular covariance has no meaning
+      const double quotient = std::min(sensor.test->nis / sensor.test->gate, kMost);
+      add_named(columns["innovations"], sensor.name, rounded(quotient, 1e-4), i - from);
+    }
   }
   fill_up(columns["stages"], frames.size() - from);
   fill_up(columns["sensors"], frames.size() - from);
+  fill_up(columns["innovations"], frames.size() - from);
   return columns.dump();
 }
 

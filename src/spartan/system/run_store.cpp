@@ -50,6 +50,9 @@ CREATE TABLE IF NOT EXISTS counts (
   id INTEGER PRIMARY KEY CHECK (id = 1), frames INTEGER NOT NULL, terrain INTEGER NOT NULL, maps INTEGER NOT NULL);
 CREATE TABLE IF NOT EXISTS localization_inputs (seq INTEGER NOT NULL, inputs BLOB NOT NULL);
 CREATE TABLE IF NOT EXISTS smoothed (seq INTEGER PRIMARY KEY, pose BLOB NOT NULL, covariance BLOB NOT NULL);
+CREATE TABLE IF NOT EXISTS innovations (
+  seq INTEGER NOT NULL, sensor TEXT NOT NULL, stamp_ns INTEGER NOT NULL, nis REAL NOT NULL, gate REAL NOT NULL);
+CREATE TABLE IF NOT EXISTS latencies (seq INTEGER PRIMARY KEY, wall_ms REAL NOT NULL);
 )";
 // Frames are numbered from 1 without gaps; terrain views and maps are committed in the order of their stamps.
 constexpr const char* kReturnToCheckpoint = R"(
@@ -60,6 +63,8 @@ DELETE FROM localization WHERE seq > (SELECT frames FROM counts);
 DELETE FROM slam WHERE seq > (SELECT frames FROM counts);
 DELETE FROM health WHERE seq > (SELECT frames FROM counts);
 DELETE FROM localization_inputs WHERE seq > (SELECT frames FROM counts);
+DELETE FROM innovations WHERE seq > (SELECT frames FROM counts);
+DELETE FROM latencies WHERE seq > (SELECT frames FROM counts);
 DELETE FROM terrain WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
   SELECT stamp_ns FROM terrain ORDER BY stamp_ns LIMIT (SELECT terrain FROM counts));
 DELETE FROM maps WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
@@ -117,36 +122,30 @@ Status RunStore::State::prepare() {
                                  kAddedTables, kUserVersion, kLogPages));
       !s)
     return s;
-  const auto make = [&](std::optional<SqlStatement>& statement, const char* sql) -> Status {
+  const std::pair<std::optional<SqlStatement>*, const char*> statements[] = {
+      {&insert_frame, "INSERT INTO frames VALUES (NULL,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)"},
+      {&insert_time, "INSERT INTO stage_times VALUES ((SELECT max(seq) FROM frames),?,?,?)"},
+      {&insert_latency, "INSERT INTO latencies VALUES ((SELECT max(seq) FROM frames),?)"},
+      {&insert_localization, "INSERT INTO localization VALUES ((SELECT max(seq) FROM frames),?,?,?,?,?,?)"},
+      {&insert_slam, "INSERT INTO slam VALUES ((SELECT max(seq) FROM frames),?,?)"},
+      {&insert_health, "INSERT INTO health VALUES ((SELECT max(seq) FROM frames),?,?,?)"},
+      {&insert_innovation, "INSERT INTO innovations VALUES ((SELECT max(seq) FROM frames),?,?,?,?)"},
+      {&insert_inputs, "INSERT INTO localization_inputs VALUES ((SELECT coalesce(max(seq), 0) FROM frames),?)"},
+      {&insert_smoothed, "INSERT INTO smoothed VALUES (?,?,?)"},
+      {&insert_map, "INSERT INTO maps VALUES (?,?,?,?,?,?,?,?,?,?,?)"},
+      {&insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"},
+      {&replace_checkpoint, "INSERT OR REPLACE INTO memory VALUES (1,?,?)"},
+      {&replace_content, "INSERT OR REPLACE INTO identity VALUES ('content',?)"},
+      {&replace_stream, "INSERT OR REPLACE INTO identity VALUES ('stream',?)"},
+      {&replace_elapsed, "INSERT OR REPLACE INTO elapsed VALUES (1,?,?)"},
+      {&replace_counts, kReplaceCounts},
+      {&select_progress, kSelectProgress},
+  };
+  for (const auto& [statement, sql] : statements) {
     auto prepared = db.prepare(sql);
     if (!prepared) return failure(prepared);
-    statement.emplace(std::move(*prepared));
-    return {};
-  };
-  if (Status s = make(insert_frame, "INSERT INTO frames VALUES (NULL,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)");
-      !s)
-    return s;
-  if (Status s = make(insert_time, "INSERT INTO stage_times VALUES ((SELECT max(seq) FROM frames),?,?,?)"); !s)
-    return s;
-  if (Status s =
-          make(insert_localization, "INSERT INTO localization VALUES ((SELECT max(seq) FROM frames),?,?,?,?,?,?)");
-      !s)
-    return s;
-  if (Status s = make(insert_slam, "INSERT INTO slam VALUES ((SELECT max(seq) FROM frames),?,?)"); !s) return s;
-  if (Status s = make(insert_health, "INSERT INTO health VALUES ((SELECT max(seq) FROM frames),?,?,?)"); !s) return s;
-  if (Status s =
-          make(insert_inputs, "INSERT INTO localization_inputs VALUES ((SELECT coalesce(max(seq), 0) FROM frames),?)");
-      !s)
-    return s;
-  if (Status s = make(insert_smoothed, "INSERT INTO smoothed VALUES (?,?,?)"); !s) return s;
-  if (Status s = make(insert_map, "INSERT INTO maps VALUES (?,?,?,?,?,?,?,?,?,?,?)"); !s) return s;
-  if (Status s = make(insert_terrain, "INSERT INTO terrain VALUES (?,?,?,?)"); !s) return s;
-  if (Status s = make(replace_checkpoint, "INSERT OR REPLACE INTO memory VALUES (1,?,?)"); !s) return s;
-  if (Status s = make(replace_content, "INSERT OR REPLACE INTO identity VALUES ('content',?)"); !s) return s;
-  if (Status s = make(replace_stream, "INSERT OR REPLACE INTO identity VALUES ('stream',?)"); !s) return s;
-  if (Status s = make(replace_elapsed, "INSERT OR REPLACE INTO elapsed VALUES (1,?,?)"); !s) return s;
-  if (Status s = make(replace_counts, kReplaceCounts); !s) return s;
-  if (Status s = make(select_progress, kSelectProgress); !s) return s;
+    statement->emplace(std::move(*prepared));
+  }
   const auto stored = stored_progress();
   if (!stored) return failure(stored);
   progress = *stored;
@@ -237,6 +236,9 @@ Status RunStore::State::write(const LocalizationRecord& l) {
   if (Status s = i.run(); !s) return s;
   for (const LocalizationRecord::Sensor& sensor : l.sensors) {
     if (Status s = insert_health->bind(1, sensor.name).bind(2, sensor.state).bind(3, sensor.reason).run(); !s) return s;
+    if (!sensor.test) continue;
+    insert_innovation->bind(1, sensor.name).bind(2, sensor.test->stamp.ns);
+    if (Status s = insert_innovation->bind(3, sensor.test->nis).bind(4, sensor.test->gate).run(); !s) return s;
   }
   return {};
 }
@@ -276,6 +278,9 @@ Status RunStore::State::write(const FrameRecord& frame) {
   f.bind(21, std::int64_t{motion.matches}).bind(22, std::int64_t{motion.inliers}).bind(23, motion.rms_px);
   if (Status s = f.run(); !s) return s;
   if (Status s = write(frame.times); !s) return s;
+  if (frame.latency_ms) {
+    if (Status s = insert_latency->bind(1, *frame.latency_ms).run(); !s) return s;
+  }
   if (frame.slam) {
     insert_slam->bind(1, bytes_of(frame.slam->pose)).bind(2, bytes_of(frame.slam->covariance));
     if (Status s = insert_slam->run(); !s) return s;

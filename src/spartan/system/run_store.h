@@ -15,6 +15,7 @@
 #include "spartan/core/result.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/time.h"
+#include "spartan/localization/localizer.h"
 #include "spartan/odometry/odometer.h"
 #include "spartan/slam/tile_store.h"
 
@@ -26,6 +27,8 @@ struct LocalizationRecord {
   std::optional<double> slip, slip_sigma;
   struct Sensor {
     std::string name, state, reason;  ///< as LocalizationEstimate::health
+    /// The last test of an innovation since the frame before; none if there was none, or by an older version.
+    std::optional<InnovationTest> test{};
   };
   std::vector<Sensor> sensors;
 };
@@ -45,6 +48,7 @@ struct FrameRecord {
   std::optional<LocalizationRecord> localization;  ///< none if the frame is missing
   std::optional<UncertainPose> smoothed;           ///< localization by all measurements; none before the end of the run
   std::vector<StageTime> times;
+  std::optional<double> latency_ms{};  ///< of a live run: from the arrival of the images to the pose
 };
 
 /// The local map of a stop.

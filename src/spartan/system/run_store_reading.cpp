@@ -78,7 +78,7 @@ bool is_pose(const Pose& pose) {
 }
 
 constexpr const char* kNoPose = "a pose is incomplete or not finite";
-constexpr const char* kDamagedRow = "a pose is incomplete or not finite, or a state is unknown";
+constexpr const char* kDamagedRow = "a pose is incomplete, a number is not finite, or a state is unknown";
 
 // The names of SensorState.
 bool is_sensor_state(std::string_view name) {
@@ -104,6 +104,60 @@ std::optional<LocalizationRecord> localization_of(const SqlStatement& row) {
   if (!row.is_null(6)) l.slip_sigma = row.real(6);
   return l;
 }
+
+bool add_innovation(const SqlStatement& row, FrameRecord& frame) {
+  const InnovationTest test{Stamp{row.integer(2)}, row.real(3), row.real(4)};
+  if (!std::isfinite(test.nis) || !std::isfinite(test.gate) || test.nis < 0) return false;
+  if (!frame.localization) return true;
+  for (LocalizationRecord::Sensor& sensor : frame.localization->sensors) {
+    if (sensor.name == row.text(1)) sensor.test = test;
+  }
+  return true;
+}
+
+// What other tables contain about a frame: `add` reads a row, and returns false where it is damaged.
+struct FrameTable {
+  const char* name;
+  const char* select;
+  bool optional;  ///< older versions of the program did not write it
+  bool (*add)(const SqlStatement& row, FrameRecord& frame);
+};
+
+// Each after those that it builds on. Tables with several rows per frame are written in its transaction, so their rows
+// are in the order of the frames.
+constexpr FrameTable kFrameTables[] = {
+    {"stage_times", "SELECT seq, stage, wall_ms, cpu_ms FROM stage_times ORDER BY rowid", false,
+     [](const SqlStatement& row, FrameRecord& frame) {
+       frame.times.push_back({row.text(1), row.real(2), row.real(3)});
+       return true;
+     }},
+    {"latencies", "SELECT seq, wall_ms FROM latencies ORDER BY seq", true,
+     [](const SqlStatement& row, FrameRecord& frame) {
+       frame.latency_ms = row.real(1);
+       return std::isfinite(*frame.latency_ms);
+     }},
+    {"slam", "SELECT * FROM slam ORDER BY seq", false,
+     [](const SqlStatement& row, FrameRecord& frame) {
+       frame.slam = uncertain_pose_of(row, 1);
+       return frame.slam.has_value();
+     }},
+    {"smoothed", "SELECT * FROM smoothed ORDER BY seq", true,
+     [](const SqlStatement& row, FrameRecord& frame) {
+       frame.smoothed = uncertain_pose_of(row, 1);
+       return frame.smoothed.has_value();
+     }},
+    {"localization", "SELECT * FROM localization ORDER BY seq", false,
+     [](const SqlStatement& row, FrameRecord& frame) {
+       frame.localization = localization_of(row);
+       return frame.localization.has_value();
+     }},
+    {"health", "SELECT seq, sensor, state, reason FROM health ORDER BY rowid", false,
+     [](const SqlStatement& row, FrameRecord& frame) {
+       if (frame.localization) frame.localization->sensors.push_back({row.text(1), row.text(2), row.text(3)});
+       return is_sensor_state(row.text(2));
+     }},
+    {"innovations", "SELECT seq, sensor, stamp_ns, nis, gate FROM innovations ORDER BY rowid", true, add_innovation},
+};
 
 // None if a pose or a covariance is incomplete, a pose is not finite, or a stamp is out of range.
 std::optional<FrameRecord> frame_of(const SqlStatement& row) {
@@ -193,63 +247,34 @@ TileStore& RunStore::tiles() {
   return *state_->tiles;
 }
 
-// Tables with several rows per frame are written in its transaction, so their rows are in the order of the frames.
 Result<std::vector<FrameRecord>> RunStore::frames() {
   Database& db = state_->db;
   auto select = db.prepare("SELECT * FROM frames ORDER BY seq");
   if (!select) return failure(select);
-  auto times = RowsOfFrames::open(db, "SELECT seq, stage, wall_ms, cpu_ms FROM stage_times ORDER BY rowid");
-  if (!times) return failure(times);
-  auto localization = RowsOfFrames::open(db, "SELECT * FROM localization ORDER BY seq");
-  if (!localization) return failure(localization);
-  auto slam = RowsOfFrames::open(db, "SELECT * FROM slam ORDER BY seq");
-  if (!slam) return failure(slam);
-  const auto was_smoothed = has_table(db, "smoothed");
-  if (!was_smoothed) return failure(was_smoothed);
-  auto smoothed = RowsOfFrames::open(
-      db, *was_smoothed ? "SELECT * FROM smoothed ORDER BY seq" : "SELECT * FROM slam WHERE seq < 0 ORDER BY seq");
-  if (!smoothed) return failure(smoothed);
-  auto health = RowsOfFrames::open(db, "SELECT seq, sensor, state, reason FROM health ORDER BY rowid");
-  if (!health) return failure(health);
+  std::vector<std::pair<const FrameTable*, RowsOfFrames>> tables;
+  for (const FrameTable& table : kFrameTables) {
+    const auto there = table.optional ? has_table(db, table.name) : true;
+    if (!there) return failure(there);
+    if (!*there) continue;
+    auto rows = RowsOfFrames::open(db, table.select);
+    if (!rows) return failure(rows);
+    tables.emplace_back(&table, std::move(*rows));
+  }
   std::vector<FrameRecord> records;
   for (;;) {
     const auto row = select->step();
     if (!row) return failure(row);
     if (!*row) return records;
-    const std::int64_t seq = select->integer(0);
     auto frame = frame_of(*select);
     if (!frame) return damaged_table(db, "frames", kNoPose);
-    FrameRecord& r = records.emplace_back(std::move(*frame));
-    const char* damaged = nullptr;  // name of a table
-    Status read = times->of(seq, [&](const SqlStatement& time) {
-      r.times.push_back({time.text(1), time.real(2), time.real(3)});
-    });
-    if (read) {
-      read = slam->of(seq, [&](const SqlStatement& corrected) {
-        r.slam = uncertain_pose_of(corrected, 1);
-        if (!r.slam) damaged = "slam";
-      });
+    FrameRecord& record = records.emplace_back(std::move(*frame));
+    for (auto& [table, rows] : tables) {
+      bool whole = true;
+      const Status read =
+          rows.of(select->integer(0), [&](const SqlStatement& detail) { whole = table->add(detail, record) && whole; });
+      if (!read) return failure(read);
+      if (!whole) return damaged_table(db, table->name, kDamagedRow);
     }
-    if (read) {
-      read = smoothed->of(seq, [&](const SqlStatement& by_all) {
-        r.smoothed = uncertain_pose_of(by_all, 1);
-        if (!r.smoothed) damaged = "smoothed";
-      });
-    }
-    if (read) {
-      read = localization->of(seq, [&](const SqlStatement& localized) {
-        r.localization = localization_of(localized);
-        if (!r.localization) damaged = "localization";
-      });
-    }
-    if (read) {
-      read = health->of(seq, [&](const SqlStatement& sensor) {
-        if (!is_sensor_state(sensor.text(2))) damaged = "health";
-        if (r.localization) r.localization->sensors.push_back({sensor.text(1), sensor.text(2), sensor.text(3)});
-      });
-    }
-    if (!read) return failure(read);
-    if (damaged != nullptr) return damaged_table(db, damaged, kDamagedRow);
   }
 }
 

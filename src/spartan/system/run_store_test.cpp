@@ -43,6 +43,8 @@ FrameRecord some_frame(int i) {
   if (i > 0) localization.slip = 0.01 * i;
   if (i > 0) localization.slip_sigma = 0.02;
   localization.sensors = {{"vision", "ok", ""}, {"imu", "excluded", "frozen since then"}};
+  if (i > 0) localization.sensors[0].test = InnovationTest{frame.stamp, 3.5 + i, 22.5};
+  if (i > 0) frame.latency_ms = 20.25 + i;
   return frame;
 }
 
@@ -121,6 +123,13 @@ TEST(RunStore, ReadsCommittedRecordsBitForBit) {
     EXPECT_EQ(localized.sensors[1].name, "imu");
     EXPECT_EQ(localized.sensors[1].state, "excluded");
     EXPECT_EQ(localized.sensors[1].reason, "frozen since then");
+    EXPECT_FALSE(localized.sensors[1].test);
+    EXPECT_EQ(read.latency_ms, expected.latency_ms);
+    ASSERT_EQ(localized.sensors[0].test.has_value(), i > 0);
+    if (i == 0) continue;
+    EXPECT_EQ(localized.sensors[0].test->stamp, expected.stamp);
+    EXPECT_EQ(localized.sensors[0].test->nis, 3.5 + i);
+    EXPECT_EQ(localized.sensors[0].test->gate, 22.5);
   }
   EXPECT_EQ(frames->back().times.back().stage, "maps");
   EXPECT_EQ(frames->back().times.back().wall_ms, 7.0);

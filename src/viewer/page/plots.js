@@ -30,11 +30,20 @@
       return {width, height, scale};
     };
     const drawLines = (plot, context, {width, height, scale}) => {
-      const top = Math.max(...plot.series.map(s => s.columns.reduce((most, v) => v !== null && v > most ? v : most, 0)), 1e-9);
-      plot.top = top;
+      const largest = Math.max(...plot.series.map(s => s.columns.reduce((most, v) => v !== null && v > most ? v : most, 0)), 1e-9);
+      const top = plot.limit ? Math.min(Math.max(largest, 1.2 * plot.limit), 4 * plot.limit) : largest;
       context.strokeStyle = css('--rule');
       context.lineWidth = 1;
       context.strokeRect(0.5, 0.5, width - 1, height - 1);
+      if (plot.limit) {
+        const y = Math.round(height - 2 - plot.limit / top * (height - 4)) + 0.5;
+        context.setLineDash([2 * scale, 3 * scale]);
+        context.strokeStyle = css('--ink');
+        context.beginPath();
+        context.moveTo(0, y);
+        context.lineTo(width, y);
+        context.stroke();
+      }
       for (const series of plot.series) {
         context.strokeStyle = css(series.colour);
         context.lineWidth = 1.5 * scale;
@@ -43,7 +52,7 @@
         let drawing = false;
         series.columns.forEach((value, x) => {
           if (value === null) return;
-          const y = height - 2 - value / top * (height - 4);
+          const y = height - 2 - Math.min(value / top, 1) * (height - 4);
           if (drawing) context.lineTo(x, y); else context.moveTo(x, y);
           drawing = true;
         });
@@ -123,6 +132,12 @@
       add({title: 'σ of the position', unit: ' mm', series: [
         {name: 'x', colour: '--red', values: sigma(0)}, {name: 'y', colour: '--green', dash: [5, 3], values: sigma(1)},
         {name: 'z', colour: '--blue', dash: [2, 2], values: sigma(2)}]});
+      for (const [name, values] of Object.entries(frames.innovations)) {
+        add({title: `Innovation: ${name}`, unit: '', limit: 1, series: [
+          {name: 'squared, by its covariance and gate; above the line it was rejected', colour: '--blue', values}]});
+      }
+      if (frames.latency_ms.some(v => v !== null))
+        add({title: 'Latency', unit: ' ms', series: [{name: 'image to pose', colour: '--purple', values: frames.latency_ms}]});
       const colours = ['--blue', '--orange', '--green', '--red', '--purple', '--light-blue'];
       Object.entries(frames.stages).forEach(([name, values], i) =>
         add({title: `Time: ${name}`, unit: ' ms', series: [{name, colour: colours[i % colours.length], values}]}));

@@ -101,7 +101,7 @@
     for (const [name, value] of Object.entries(more)) {
       if (Array.isArray(value)) frames[name] = frames[name].concat(value);
     }
-    for (const table of ['stages', 'sensors']) {
+    for (const table of ['stages', 'sensors', 'innovations']) {
       for (const [name, values] of Object.entries(more[table])) {
         frames[table][name] = (frames[table][name] || new Array(more.from).fill(null)).concat(values);
       }

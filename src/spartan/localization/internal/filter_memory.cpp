@@ -13,6 +13,11 @@ struct Put {
   void size(const std::vector<T>& values) {
     out.put(static_cast<std::uint32_t>(values.size()));
   }
+  template <class T, class Visit>
+  void optional(const std::optional<T>& value, const Visit& visit) {
+    (*this)(value.has_value());
+    if (value) visit(*value);
+  }
   template <class T>
   void operator()(const T& value) {
     if constexpr (std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, Pose>) {
@@ -37,6 +42,12 @@ struct Get {
     const auto count = in.get<std::uint32_t>();
     plausible = plausible && count <= kMost;
     values.resize(std::min(count, kMost));
+  }
+  template <class T, class Visit>
+  void optional(std::optional<T>& value, const Visit& visit) {
+    bool there = false;
+    (*this)(there);
+    if (there) visit(value.emplace());
   }
   template <class T>
   void operator()(T& value) {
@@ -130,6 +141,7 @@ template <class Each, class Monitor>
 void visit_monitor(Each& each, Monitor& j) {
   each(j.seen), each(j.last), each(j.state), each(j.reason), each(j.nis), each(j.limit);
   each(j.used), each(j.rejected), each(j.passed_in_row), each(j.failed_in_row);
+  each.optional(j.test, [&](auto& test) { each(test.stamp), each(test.nis), each(test.gate); });
 }
 
 template <class Each, class Memory>

@@ -14,10 +14,12 @@ struct LatencyRecord {
   std::vector<float> maps_ms;  ///< from leaving a stop to its map in the global map
 
   using Time = std::chrono::steady_clock::time_point;
-  void add(Time arrived, Time answered, bool at_stop) {
+  /// Returns the latency.
+  float add(Time arrived, Time answered, bool at_stop) {
     const float ms = std::chrono::duration<float, std::milli>(answered - arrived).count();
     all_ms.push_back(ms);
     if (at_stop) at_stops_ms.push_back(ms);
+    return ms;
   }
 };
 

@@ -21,22 +21,6 @@ constexpr double kBackEndPatience = 10;
 // A live run looks so often whether it should stop.
 constexpr std::chrono::milliseconds kStopPoll{50};
 
-LocalizationRecord localization_record(const LocalizationEstimate& estimate) {
-  LocalizationRecord record;
-  record.world_from_body = estimate.world_from_body;
-  record.odom_from_body = estimate.odom_from_body;
-  if (estimate.slip) {
-    record.slip = estimate.slip->slip;
-    record.slip_sigma = estimate.slip->sigma;
-  }
-  for (std::size_t i = 0; i < estimate.health.size(); ++i) {
-    const SensorHealth& health = estimate.health[i];
-    record.sensors.push_back(
-        {std::string(name_of(static_cast<LocalizationSensor>(i))), std::string(name_of(health.state)), health.reason});
-  }
-  return record;
-}
-
 }  // namespace
 
 Status RunLoop::begin() {
@@ -63,7 +47,13 @@ Status RunLoop::begin() {
   const Trajectory so_far = trajectory_of(*frames, TrajectoryKind::odometry);
   distance_m_ = path_length(so_far);
   if (!so_far.empty()) last_position_ = so_far.back().pose.translation();
-  for (const FrameRecord& frame : *frames) usable_frames_ += frame.status != "missing";
+  for (const FrameRecord& frame : *frames) {
+    usable_frames_ += frame.status != "missing";
+    if (!frame.localization) continue;
+    for (const LocalizationRecord::Sensor& sensor : frame.localization->sensors) {
+      if (sensor.test) tested_[sensor.name] = sensor.test->stamp;
+    }
+  }
   if (Status status = pipeline_.restore((*checkpoint)->pipeline_state, recorder_->tiles()); !status) return status;
   if (Status status = restore_pending_frames(); !status) return status;
   samples_taken_ = (*checkpoint)->source.samples_taken;
@@ -251,7 +241,9 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
     return {};
   }
   FrameResult& output = **result;
-  if (!recording_ && !catching_up_) latencies_.add(arrived_, std::chrono::steady_clock::now(), at_stop);
+  std::optional<double> latency_ms;
+  if (!recording_ && !catching_up_)
+    latency_ms = latencies_.add(arrived_, std::chrono::steady_clock::now(), at_stop);
   ++usable_frames_;
   RunResult recorded;
   FrameRecord& record = recorded.step.frame.emplace();
@@ -265,6 +257,7 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
   record.world_from_body = output.world_from_body;
   record.motion = output.motion;
   record.slam = output.slam;
+  record.latency_ms = latency_ms;
   if (output.localization) record.localization = localization_record(*output.localization);
   if (output.motion.status == TrackingStatus::lost) {
     hooks_.log.warning(fmt::format("frame {}: odometry lost: {}", output.frame_id, output.motion.reason));
@@ -331,6 +324,30 @@ Status RunLoop::record(RunResult result) {
   report_disk();
   if (status && hooks_.progress) hooks_.progress(progress);
   return status;
+}
+
+// Each test of an innovation is in one record: none where a sensor was not tested since the frame before.
+LocalizationRecord RunLoop::localization_record(const LocalizationEstimate& estimate) {
+  LocalizationRecord record;
+  record.world_from_body = estimate.world_from_body;
+  record.odom_from_body = estimate.odom_from_body;
+  if (estimate.slip) {
+    record.slip = estimate.slip->slip;
+    record.slip_sigma = estimate.slip->sigma;
+  }
+  for (std::size_t i = 0; i < estimate.health.size(); ++i) {
+    const SensorHealth& health = estimate.health[i];
+    LocalizationRecord::Sensor& sensor = record.sensors.emplace_back();
+    sensor.name = name_of(static_cast<LocalizationSensor>(i));
+    sensor.state = name_of(health.state);
+    sensor.reason = health.reason;
+    if (!health.test) continue;
+    const auto recorded = tested_.find(sensor.name);
+    if (recorded != tested_.end() && recorded->second == health.test->stamp) continue;
+    tested_[sensor.name] = health.test->stamp;
+    sensor.test = health.test;
+  }
+  return record;
 }
 
 void RunLoop::report_disk() {

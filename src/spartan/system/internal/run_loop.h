@@ -97,6 +97,7 @@ class RunLoop {
   Status process_missing(const MissingFrame& missing);
   /// Records a frame, with a checkpoint where one is due.
   Status record(RunResult result);
+  LocalizationRecord localization_record(const LocalizationEstimate& estimate);
   void add_checkpoint(RunResult& result);
   void report_estimate();
   void report_disk();
@@ -130,6 +131,7 @@ class RunLoop {
   std::string first_error_;
   std::chrono::steady_clock::time_point arrived_;  // of the sample that is processed
   LatencyRecord latencies_;
+  std::map<std::string, Stamp> tested_;  // the latest innovation test of each sensor that is recorded
   bool disk_failed_ = false;
   bool after_frame_ = true;  // nothing was processed since the last frame of the odometry pair
   std::optional<std::chrono::steady_clock::time_point> stopped_;

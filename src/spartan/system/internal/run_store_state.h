@@ -16,9 +16,9 @@ struct RunStore::State {
   explicit State(Database db_in) : db(std::move(db_in)) {}
   std::optional<TileStore> tiles;
   Database db;
-  std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_slam, insert_health, insert_inputs,
-      insert_smoothed, insert_terrain, insert_map, select_progress, replace_checkpoint, replace_content,
-      replace_elapsed, replace_counts, replace_stream;
+  std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_slam, insert_health,
+      insert_innovation, insert_latency, insert_inputs, insert_smoothed, insert_terrain, insert_map, select_progress,
+      replace_checkpoint, replace_content, replace_elapsed, replace_counts, replace_stream;
   /// How far the stored run has come.
   struct Progress {
     std::int64_t frames = 0, samples_taken = 0;  ///< committed frames; samples at the latest checkpoint, −1: none

@@ -15,12 +15,11 @@ constexpr double kBiasFraction = 0.003;
 void correct_by_reading(FilterMemory& memory, const Innovation& innovation, const BiasedSensor& of,
                         const SensorGates& gates) {
   ErrorCovariance& p = memory.estimate.covariance;
-  SensorMonitor& monitor = memory.monitor(of.sensor);
   const double nis = normalized_innovation_squared(p, innovation);
-  if (gates.accept(monitor, nis, innovation.rows(), HealthReason::disagrees)) {
+  if (gates.accept(memory, of.sensor, nis, innovation.rows(), HealthReason::disagrees)) {
     if (memory.inertial_usable()) of.noise.add(p, innovation, of.stated_variance);
     correct_world(memory, innovation);
-  } else if (monitor.state == SensorState::excluded) {
+  } else if (memory.monitor(of.sensor).state == SensorState::excluded) {
     p.diagonal().segment(of.bias, innovation.rows()) += kBiasFraction * innovation.residual.cwiseAbs2();
   }
 }

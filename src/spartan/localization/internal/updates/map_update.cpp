@@ -19,7 +19,7 @@ void MapUpdate::apply(FilterMemory& memory, const PoseConstraint& of_body, int p
   const Innovation innovation = map_innovation(memory.estimate, pose, constraint, covariance_factor_);
   if (innovation.rows() == 0) return;
   const double nis = normalized_innovation_squared(memory.estimate.covariance, innovation);
-  if (gates_.accept(memory.monitor(LocalizationSensor::map), nis, innovation.rows(), HealthReason::disagrees))
+  if (gates_.accept(memory, LocalizationSensor::map, nis, innovation.rows(), HealthReason::disagrees))
     correct_by_map(memory, innovation);
 }
 

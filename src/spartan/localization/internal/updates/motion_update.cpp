@@ -163,9 +163,12 @@ bool MotionUpdate::update_by_motion(FilterMemory& memory, const VisualMotion& vi
 }
 
 bool MotionUpdate::accept(FilterMemory& memory, const MotionDecision& decision) const {
-  SensorMonitor& monitor = memory.monitor(LocalizationSensor::vision);
-  const bool accepted = gates_.accept_within(monitor, decision.nis, decision.gate, decision.why);
+  constexpr LocalizationSensor kVision = LocalizationSensor::vision;
+  const bool accepted = decision.use == MotionUse::follow
+                            ? gates_.accept_untested(memory, kVision)
+                            : gates_.accept_within(memory, kVision, decision.nis, decision.gate, decision.why);
   if (accepted && decision.uncertain) {
+    SensorMonitor& monitor = memory.monitor(kVision);
     monitor.state = SensorState::suspect;
     monitor.reason = HealthReason::implausible;
   }
@@ -202,8 +205,7 @@ void MotionUpdate::reset_prediction(FilterMemory& memory, const Innovation& inno
   inflate_prediction(memory.estimate, innovation, motion);
   memory.vision.reset = true;
   memory.step.stationary = false;
-  gates_.accept_within(memory.monitor(LocalizationSensor::imu), nis, gates_.limits().vision,
-                       HealthReason::contradicted);
+  gates_.accept_within(memory, LocalizationSensor::imu, nis, gates_.limits().vision, HealthReason::contradicted);
   correct_motion(memory, innovation, error_at::kVisionClone);
 }
 

@@ -1,5 +1,8 @@
 #include "spartan/localization/internal/updates/sensor_gates.h"
 
+#include <cmath>
+#include <limits>
+
 #include "spartan/localization/internal/chi_square.h"
 
 namespace spartan::internal {
@@ -11,12 +14,24 @@ SensorGates::SensorGates(const LocalizationOptions& options)
   limits_.vision = chi_square_quantile(options.vision.gate_probability, 6);
 }
 
-bool SensorGates::accept(SensorMonitor& monitor, double nis, int rows, HealthReason why) const {
-  return accept_within(monitor, nis, limit(rows), why);
+bool SensorGates::accept(FilterMemory& memory, LocalizationSensor sensor, double nis, int rows,
+                         HealthReason why) const {
+  return accept_within(memory, sensor, nis, limit(rows), why);
 }
 
-bool SensorGates::accept_within(SensorMonitor& monitor, double nis, double limit, HealthReason why) const {
-  return monitor.accept(nis, limit, why, excluded_after_, readmit_after_);
+bool SensorGates::accept_within(FilterMemory& memory, LocalizationSensor sensor, double nis, double limit,
+                                HealthReason why) const {
+  SensorMonitor& monitor = memory.monitor(sensor);
+  // Infinite or no number where the covariance of the innovation is singular.
+  const double finite = std::isfinite(nis) ? nis : std::numeric_limits<double>::max();
+  monitor.test = InnovationTest{memory.stamp, finite, limit};
+  return monitor.accept(finite, limit, why, excluded_after_, readmit_after_);
+}
+
+bool SensorGates::accept_untested(FilterMemory& memory, LocalizationSensor sensor) const {
+  SensorMonitor& monitor = memory.monitor(sensor);
+  monitor.test.reset();
+  return monitor.accept(0, 0, HealthReason::none, excluded_after_, readmit_after_);
 }
 
 }  // namespace spartan::internal

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace spartan::internal {
 namespace {
 
@@ -20,18 +22,43 @@ TEST(SensorGates, ExcludesAndReadmits) {
   options.health.excluded_after = 2;
   options.health.readmit_after = 3;
   const SensorGates gates(options);
-  SensorMonitor monitor;
-  const auto passes = [&](double nis) { return gates.accept(monitor, nis, 1, HealthReason::disagrees); };
+  FilterMemory memory;
+  memory.stamp = {5};
+  constexpr LocalizationSensor kCompass = LocalizationSensor::compass;
+  const SensorMonitor& monitor = memory.monitor(kCompass);
+  const auto passes = [&](double nis) { return gates.accept(memory, kCompass, nis, 1, HealthReason::disagrees); };
   EXPECT_TRUE(passes(gates.limit(1)));
   EXPECT_FALSE(passes(1.01 * gates.limit(1)));
   EXPECT_EQ(monitor.state, SensorState::suspect);
-  EXPECT_FALSE(gates.accept_within(monitor, 3, 2, HealthReason::slips));
+  EXPECT_FALSE(gates.accept_within(memory, kCompass, 3, 2, HealthReason::slips));
   EXPECT_EQ(monitor.state, SensorState::excluded);
   EXPECT_EQ(monitor.reason, HealthReason::slips);
   EXPECT_FALSE(passes(1));
   EXPECT_FALSE(passes(1));
   EXPECT_TRUE(passes(1));
   EXPECT_EQ(monitor.state, SensorState::ok);
+}
+
+TEST(SensorGates, TheLastTestIsKept) {
+  constexpr LocalizationSensor kWheels = LocalizationSensor::wheels;
+  const SensorGates gates{LocalizationOptions()};
+  FilterMemory memory;
+  const SensorMonitor& monitor = memory.monitor(kWheels);
+  EXPECT_FALSE(monitor.test);
+  memory.stamp = {7};
+  gates.accept(memory, kWheels, 2.5, 3, HealthReason::disagrees);
+  ASSERT_TRUE(monitor.test);
+  EXPECT_EQ(monitor.test->stamp, Stamp{7});
+  EXPECT_EQ(monitor.test->nis, 2.5);
+  EXPECT_EQ(monitor.test->gate, gates.limit(3));
+  // Of a singular covariance: the state that is saved has finite numbers only.
+  for (const double nis : {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_FALSE(gates.accept_within(memory, kWheels, nis, 4, HealthReason::disagrees));
+    EXPECT_EQ(monitor.test->nis, std::numeric_limits<double>::max());
+    EXPECT_EQ(monitor.nis, std::numeric_limits<double>::max());
+  }
+  EXPECT_TRUE(gates.accept_untested(memory, LocalizationSensor::vision));
+  EXPECT_FALSE(memory.monitor(LocalizationSensor::vision).test);
 }
 
 }  // namespace

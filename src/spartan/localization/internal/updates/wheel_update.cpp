@@ -65,7 +65,7 @@ void WheelUpdate::update_by_step(FilterMemory& memory, const WheelSample& sample
   const bool slips = !(length_nis <= gates_.limit(1));
   const double nis = slips ? length_nis : normalized_innovation_squared(memory.estimate.covariance, whole);
   const int rows = slips ? 1 : whole.rows();
-  if (gates_.accept(memory.monitor(LocalizationSensor::wheels), nis, rows,
+  if (gates_.accept(memory, LocalizationSensor::wheels, nis, rows,
                     slips ? HealthReason::slips : HealthReason::disagrees)) {
     const StepForward known = forward_since(memory.estimate.state, error_at::kStepClone, centre_);
     const double variance = known.jacobian * memory.estimate.covariance * known.jacobian.transpose();
