@@ -10,6 +10,7 @@ import argparse
 import json
 import os
 import shutil
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -28,6 +29,7 @@ except ImportError:
         os.execv(VENV_PYTHON, [str(VENV_PYTHON), *sys.argv])
     sync_playwright = None
 
+AXE = next(VENV_PYTHON.parent.parent.glob("lib/*/site-packages/axe_playwright_python/axe.min.js"), None)
 CHROMIUM = shutil.which("chromium")
 SOFTWARE_WEBGL = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--ignore-gpu-blocklist",
                   "--enable-unsafe-swiftshader"]
@@ -105,6 +107,24 @@ def check_answers(program, run, recording):
         _, headers, page = get(url + "/")
         check(b"http://" not in page and b"https://" not in page, "the page names no other computer")
         check("default-src 'self'" in headers["Content-Security-Policy"], "and may not load from one")
+
+
+def with_innovations(run, folder):
+    """A copy of the run whose store has tests of the wheels at frames 2 (rejected) and 4."""
+    copy = folder / "tested"
+    shutil.copytree(run, copy)
+    store = sqlite3.connect(copy / "run.sqlite")
+    store.executemany("INSERT INTO innovations VALUES (?,'wheels',?,?,?)", [(3, 5, 21.0, 14.0), (5, 7, 3.5, 14.0)])
+    store.commit()
+    store.close()
+    return copy
+
+
+def check_innovations(program, run):
+    with served(program, run) as url:
+        tested = json_of(f"{url}/api/frames?from=0")["innovations"]
+        check(list(tested) == ["wheels"] and tested["wheels"][:6] == [None, None, 1.5, None, 0.25, None], f"tests: {tested}")
+        check(json_of(f"{url}/api/frames?from=4")["innovations"]["wheels"][:2] == [0.25, None], "tests from a frame on")
 
 
 def check_ports_and_ends(program, run):
@@ -185,6 +205,7 @@ def check_page(page, width):
     blank = page.evaluate("""() => [...document.querySelectorAll('.plot canvas')].filter(c =>
       !c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v)).length""")
     check(blank == 0, f"{width} px: {blank} plots are blank")
+    check("Innovation: " in page.inner_text("#plots"), f"{width} px: innovations are plotted")
 
     before = page.evaluate("() => spartan.scene.state().rover")
     page.focus("#time")
@@ -210,12 +231,20 @@ def check_page(page, width):
     check(unnamed == 0, f"{width} px: {unnamed} controls without a name")
 
 
+def check_accessibility(page, name):
+    if AXE is None:
+        return
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    found = page.evaluate("() => axe.run(document, {resultTypes: ['violations']})")["violations"]
+    serious = [f"{v['id']} ({v['nodes'][0]['html'][:80]})" for v in found if v["impact"] in ("serious", "critical")]
+    check(not serious, f"{name}: axe-core finds {serious}")
+
+
 def take_screenshot(page, path, width):
     page.evaluate("() => { const t = document.getElementById('time'); t.value = Math.floor(0.6 * t.max); t.dispatchEvent(new Event('input')); }")
-    if width < 500:  # the whole page
-        page.set_viewport_size({"width": width, "height": page.evaluate("() => document.documentElement.scrollHeight")})
+    page.evaluate("() => { document.querySelector('footer').style.position = 'static'; }")  # at the end of the whole page
     page.wait_for_timeout(2000)
-    page.screenshot(path=path)
+    page.screenshot(path=path, full_page=True)
 
 
 def check_in_browser(program, run, recording, screenshots):
@@ -223,8 +252,9 @@ def check_in_browser(program, run, recording, screenshots):
         browser = Browser(playwright, url)
         for width in (1600, 390):
             for scheme in ("light", "dark"):
-                if scheme == "light":
-                    with browser.page(width) as page:
+                with browser.page(width, scheme) as page:
+                    check_accessibility(page, f"{width} px, {scheme}")
+                    if scheme == "light":
                         check_page(page, width)
                 if screenshots:
                     with browser.page(width, scheme) as page:
@@ -253,7 +283,9 @@ def check_live(program, drive, folder):
                     time.sleep(0.3)
                 page.wait_for_function("() => !document.getElementById('state').textContent.includes('goes on')", timeout=20000)
                 seen.append(page.evaluate("() => spartan.state().total"))
-
+                check("image to pose" in page.inner_text("#plots"), "latencies are plotted")
+            latencies = json_of(f"{url}/api/frames?from=0")["latency_ms"]
+            check(len(latencies) == seen[-1] and all(0 < ms < 60000 for ms in latencies), f"latencies: {latencies}")
             check(len(set(seen)) > 2 and seen == sorted(seen), f"frames arrive while the run goes on: {seen}")
             total = len([line for line in (run / "trajectory_odometry.tum").read_text().splitlines() if line[0] != "#"])
             check(seen[-1] == total, f"{seen[-1]} frames at the end, of {total}")
@@ -287,6 +319,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         check_answers(a.program, run, drive)
         check_ports_and_ends(a.program, run)
+        tested = with_innovations(run, Path(folder))
+        check_innovations(a.program, tested)
         check_bad_input(a.program, Path(folder))
         if sync_playwright is None or CHROMIUM is None:
             print("not tried: Chromium or Playwright is not installed (./setup docs)")
@@ -294,7 +328,7 @@ def main():
         if a.screenshots:
             a.screenshots.mkdir(exist_ok=True)
         recording = a.run / "live/1" if a.run else drive
-        check_in_browser(a.program, a.run or run, recording, a.screenshots)
+        check_in_browser(a.program, a.run or tested, recording, a.screenshots)
         check_live(a.program, drive, Path(folder))
     return 0
 

@@ -132,10 +132,8 @@
       add({title: 'σ of the position', unit: ' mm', series: [
         {name: 'x', colour: '--red', values: sigma(0)}, {name: 'y', colour: '--green', dash: [5, 3], values: sigma(1)},
         {name: 'z', colour: '--blue', dash: [2, 2], values: sigma(2)}]});
-      for (const [name, values] of Object.entries(frames.innovations)) {
-        add({title: `Innovation: ${name}`, unit: '', limit: 1, series: [
-          {name: 'squared, by its covariance and gate; above the line it was rejected', colour: '--blue', values}]});
-      }
+      for (const [name, values] of Object.entries(frames.innovations))
+        add({title: `Innovation: ${name}`, unit: '', limit: 1, series: [{name: 'NIS / gate', colour: '--blue', values}]});
       if (frames.latency_ms.some(v => v !== null))
         add({title: 'Latency', unit: ' ms', series: [{name: 'image to pose', colour: '--purple', values: frames.latency_ms}]});
       const colours = ['--blue', '--orange', '--green', '--red', '--purple', '--light-blue'];
