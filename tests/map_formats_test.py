@@ -116,6 +116,22 @@ def check_colours_of_mesh(exports):
     check(compared > 500, f"{compared} cells have points")
 
 
+def check_colmap_of_named_images(exports, recording):
+    """Images whose names and times are stated, as for the run, are those of the layout that states them itself."""
+    images = exports.folder / "images"
+    images.mkdir()
+    for side, name in (("image_0", "l"), ("image_1", "r")):
+        for file in (recording / side).iterdir():
+            (images / f"{name}{file.name}").symlink_to(file)
+    reading = ("--left", "l*.png", "--right", "r*.png", "--fps", "2", "--rig", recording / "calib.txt")
+    named = Exports(exports.program, exports.folder / "named_run", exports.folder)
+    exports.spartan("run", images, "-o", named.run, *reading)
+    exports.spartan("export", named.run, "--format", "colmap", "-o", exports.folder / "named", "--recording", images, *reading)
+    kinds = [sorted((exports.folder / name / "images/left").iterdir()) for name in ("colmap", "named")]
+    check(len(kinds[0]) == len(kinds[1]) > 4, f"{len(kinds[1])} images, not {len(kinds[0])}")
+    check(all(a.read_bytes() == b.read_bytes() for a, b in zip(*kinds)), "the same images")
+
+
 def check_colmap(exports, recording):
     """pycolmap reads the model; its cameras see each terrain point where it was seen: in the gray level that it has."""
     exports.spartan("export", exports.run, "--format", "colmap", "-o", exports.folder / "colmap", "--recording", recording)
@@ -288,6 +304,7 @@ def main():
         drive = Exports(program, small_runs / "drive_run", Path(folder))
         check_colours_of_mesh(drive)
         check_colmap(drive, small_runs / "drive")
+        check_colmap_of_named_images(drive, small_runs / "drive")
         check_viewers(exports)
     return 0
 

@@ -26,6 +26,7 @@ void bind_pipeline(nanobind::module_& m);
 void bind_runs(nanobind::module_& m);
 void bind_run_results(nanobind::module_& m);
 void bind_evaluation(nanobind::module_& m);
+void bind_rig_design(nanobind::module_& m);
 void bind_simulation(nanobind::module_& m);
 
 }  // namespace spartan::python

@@ -28,5 +28,6 @@ NB_MODULE(_core, m) {
   bind_run_results(m);
   bind_runs(m);
   bind_evaluation(m);
+  bind_rig_design(m);
   bind_simulation(m);
 }

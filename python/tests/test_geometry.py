@@ -1,7 +1,9 @@
 """Poses, trajectories, camera models and rigs."""
 
 import copy
+import json
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -158,6 +160,15 @@ def test_a_rig_is_written_and_read_in_other_formats(tmp_path, name):
     assert again.rig.baseline_m(pair.name) == pytest.approx(0.12)
     assert again.rig.camera(pair.left).model.project([[0, 0, 1]]) == pytest.approx(np.array([[159.5, 119.5]]))
     assert again.format in spartan.calibration_formats()
+
+
+def test_a_rig_is_designed_as_by_the_program(program):
+    requirements = Path(__file__).parents[2] / "config/requirements/rover.yaml"
+    assert spartan.design_rig(requirements) == json.loads(program("rig", "design", requirements, "--json"))
+    wide = spartan.design_rig(requirements, whole_set=True)["wide"]
+    assert len(wide["feasible"]) == wide["feasible_count"] and wide["feasible"][0] == wide["best"]
+    with pytest.raises(spartan.Error, match="no_such.yaml"):
+        spartan.design_rig("no_such.yaml")
 
 
 def test_options_are_described_once():

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "program/commands.h"
+#include "program/recording_arguments.h"
 #include "spartan/camera/recording.h"
 #include "spartan/system/run_folder.h"
 
@@ -10,7 +11,8 @@ namespace spartan::program {
 namespace {
 
 struct ExportArguments {
-  std::string run, format, output, trajectory, recording, rig;
+  std::string run, format, output, trajectory, recording;
+  RecordingArguments reading;
   bool list = false;
 };
 
@@ -26,10 +28,10 @@ Result<ExitCode> list_formats() {
 Result<ExitCode> export_images(const Context& context, const ExportArguments& arguments,
                                std::optional<TrajectoryKind> kind, const ThreadPool& workers) {
   if (Status s = expect_new_folder(context, arguments.output); !s) return failure(s);
-  OpenOptions options;
-  options.rig_file = arguments.rig;
-  options.unfinished = true;  // what a live run that was killed has recorded
-  auto recording = open_recording(arguments.recording, options);
+  auto options = open_options(arguments.reading);
+  if (!options) return failure(options);
+  options->unfinished = true;  // what a live run that was killed has recorded
+  auto recording = open_recording(arguments.recording, *options);
   if (!recording) return failure(recording);
   const auto images = export_colmap(arguments.run, **recording, kind, workers, arguments.output);
   if (!images) return failure(images);
@@ -76,7 +78,8 @@ void add_export(CLI::App& app, Context& context) {
   command->add_option("--recording", a->recording,
                       "Recording that was run, whose images colmap needs (default: none); of a live run RUN/live/1, "
                       "and after a resume the next number. Its layout is detected.");
-  command->add_option("--rig", a->rig, "Calibration file of the recording (default: the recording's own).");
+  command->add_option("--rig", a->reading.rig, "Calibration file of the recording (default: the recording's own).");
+  add_recorded_frames_options(*command, a->reading);
   add_force_flag(*command, context);
   add_threads_option(*command, context);
 }

@@ -5,6 +5,10 @@ namespace spartan::program {
 void add_recording_options(CLI::App& command, RecordingArguments& a) {
   command.add_option("--format", a.format,
                      "Layout of the recording: spartan, kitti, kitti-raw, euroc, images or video (default: detected).");
+  add_recorded_frames_options(command, a);
+}
+
+void add_recorded_frames_options(CLI::App& command, RecordingArguments& a) {
   command.add_option("--left", a.left,
                      "Images of the left camera: a folder, a quoted pattern of file names (\"l*.png\") or a video, "
                      "relative to the recording. Needs --right (default: as the layout has them).");

@@ -19,6 +19,8 @@ struct RecordingArguments {
 /// `--format`, `--left`, `--right`, `--times`, `--fps`, `--bits`, `--pair-tolerance`, for commands that read a
 /// recording.
 void add_recording_options(CLI::App& command, RecordingArguments& arguments);
+/// The same without `--format`.
+void add_recorded_frames_options(CLI::App& command, RecordingArguments& arguments);
 /// Code `usage` for an unknown format.
 Result<OpenOptions> open_options(const RecordingArguments& arguments);
 

@@ -1,4 +1,4 @@
-// Calibration formats with one file (KITTI, KITTI raw, EuRoC, Kalibr, OpenCV) and format detection.
+// Calibration formats with one file (KITTI, KITTI raw, EuRoC, Kalibr, OpenCV, ZED) and format detection.
 // Accepted calibrations must be valid and round-trip.
 #include <cstdint>
 #include <string>
@@ -22,6 +22,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   check(spartan::read_kitti_raw_calib(input.path()), Format::kitti_raw);
   check(spartan::read_opencv_calib(input.path(), "", {640, 480}), Format::opencv);
   spartan::testing::check_survives_writing(spartan::read_kalibr_calib(input.path()));
+  spartan::testing::check_survives_writing(spartan::read_zed_calib(input.path(), {1280, 720}));
 
   const std::string text(reinterpret_cast<const char*>(data), size);
   (void)spartan::detect_calibration_format("x.txt", text);

@@ -53,6 +53,8 @@ inline const char* file_name(CalibrationFormat format) {
       return "pair.cahvor";
     case CalibrationFormat::middlebury:
       return "calib.txt";
+    case CalibrationFormat::zed:
+      return "SN1.conf";
   }
   return "";
 }

@@ -24,11 +24,12 @@ enum class CalibrationFormat {
   mrcal,
   tsai,
   cahvor,
-  middlebury
+  middlebury,
+  zed
 };
 
 /// The name of a format: "rig.yaml", "kitti", "kitti-raw", "euroc", "kalibr", "opencv", "ros", "mrcal", "tsai",
-/// "cahvor", "middlebury".
+/// "cahvor", "middlebury", "zed".
 std::string_view name_of(CalibrationFormat format);
 /// The format with that name, if there is one.
 std::optional<CalibrationFormat> calibration_format_named(std::string_view name);
@@ -85,6 +86,10 @@ Result<Rig> read_kitti_raw_calib(const std::string& path, KittiPair pair = Kitti
 /// Middlebury (2014 on) and ETH3D two-view `calib.txt`: cam0, cam1, baseline in millimetres, width, height. doffs must
 /// be the difference of the principal points; other keys are ignored.
 Result<LoadedRig> read_middlebury_calib(const std::string& path);
+
+/// SN….conf of a ZED camera: the cameras of one of its resolutions, `size`; that of the file where it has one only and
+/// `size` is empty. Not those of fisheye lenses.
+Result<LoadedRig> read_zed_calib(const std::string& path, ImageSize size = {});
 
 /// EuRoC/ASL: `mav0/cam0/sensor.yaml`, `mav0/cam1/sensor.yaml` and further cameras; the body is the body frame of
 /// T_BS. Models as in Kalibr's files. The first two cameras are the pair.

@@ -14,7 +14,7 @@ struct FormatKind {
   std::string_view name;
   bool file_per_camera, image_size;
 };
-constexpr std::array<FormatKind, 11> kKinds{{
+constexpr std::array<FormatKind, 12> kKinds{{
     {CalibrationFormat::rig_yaml, "rig.yaml", false, true},
     {CalibrationFormat::kitti, "kitti", false, false},
     {CalibrationFormat::kitti_raw, "kitti-raw", false, true},
@@ -26,8 +26,9 @@ constexpr std::array<FormatKind, 11> kKinds{{
     {CalibrationFormat::tsai, "tsai", true, false},
     {CalibrationFormat::cahvor, "cahvor", true, true},
     {CalibrationFormat::middlebury, "middlebury", false, true},
+    {CalibrationFormat::zed, "zed", false, true},
 }};
-static_assert(kKinds[static_cast<std::size_t>(CalibrationFormat::middlebury)].format == CalibrationFormat::middlebury);
+static_assert(kKinds[static_cast<std::size_t>(CalibrationFormat::zed)].format == CalibrationFormat::zed);
 
 const FormatKind& kind_of(CalibrationFormat format) {
   return kKinds[static_cast<std::size_t>(format)];
@@ -43,6 +44,7 @@ std::optional<CalibrationFormat> format_of_extension(const std::string& extensio
   if (extension == ".cahv" || extension == ".cahvor" || extension == ".cahvore") return CalibrationFormat::cahvor;
   if (extension == ".cameramodel") return CalibrationFormat::mrcal;
   if (extension == ".xml") return CalibrationFormat::opencv;
+  if (extension == ".conf") return CalibrationFormat::zed;
   return std::nullopt;
 }
 

@@ -89,6 +89,11 @@ Result<LoadedRig> read_as(CalibrationFormat format, const std::string& path, Ima
     }
     case CalibrationFormat::middlebury:
       return read_middlebury_calib(path);
+    case CalibrationFormat::zed: {
+      const auto size = size_hint.empty() ? size_of_images_beside(file) : size_hint;
+      if (!size) return failure(size);
+      return read_zed_calib(path, *size);
+    }
     case CalibrationFormat::kalibr:
       return read_kalibr_calib(path);
     case CalibrationFormat::opencv:
@@ -167,7 +172,7 @@ Result<LoadedRig> read_calibration(const std::string& path, ImageSize size_hint)
     return failure(ErrorCode::configuration, "is not a calibration file of a known format", first,
                    "known formats: rig.yaml, KITTI calib.txt and calib_cam_to_cam.txt, Middlebury calib.txt, EuRoC "
                    "sensor.yaml, Kalibr camchain, "
-                   "OpenCV yml or xml, ROS camera_info, mrcal .cameramodel, Ames .tsai, JPL .cahvor");
+                   "OpenCV yml or xml, ROS camera_info, mrcal .cameramodel, Ames .tsai, JPL .cahvor, ZED .conf");
   }
   if (first != path && !has_file_per_camera(*format)) {
     return failure(ErrorCode::configuration, fmt::format("{} does not use one file per camera", name_of(*format)), path,

@@ -22,6 +22,7 @@ struct FormatCase {
   std::vector<const char*> models;  // names of any_model()
   bool body, left_camera;           // which body frames it supports: any, the left camera
   bool sizes;                       // an image size for each camera
+  std::vector<ImageSize> only{};    // the image sizes that it supports; empty: any
 };
 const std::vector<FormatCase> kFormatCases{
     {Format::rig_yaml,
@@ -66,6 +67,13 @@ const std::vector<FormatCase> kFormatCases{
      true},
     {Format::tsai, "pair.tsai", {"pinhole", "radtan4", "two_terms", "radtan5"}, true, true, false},
     {Format::middlebury, "calib.txt", {"pinhole"}, false, true, false},
+    {Format::zed,
+     "SN1234.conf",
+     {"pinhole", "radtan4", "two_terms", "radtan5"},
+     false,
+     true,
+     false,
+     {{2208, 1242}, {1920, 1200}, {1920, 1080}, {1280, 720}, {960, 600}, {672, 376}}},
     {Format::cahvor,
      "pair.cahvor",
      {"pinhole", "radtan4", "two_terms", "radtan5", "radtan8", "cahv", "cahvor", "cahvore"},
@@ -144,8 +152,8 @@ std::set<std::string> native_only_keys(const Rig& rig) {
 }
 
 // A rig of one pair, optionally rectified. With `body`, the left camera looks roughly forward in a REP-103 body frame.
-Rig any_rig(const std::string& kind, bool body, bool rectified, bool sizes) {
-  const ImageSize size = any_size();
+Rig any_rig(const std::string& kind, bool body, bool rectified, bool sizes, const std::vector<ImageSize>& only = {}) {
+  const ImageSize size = only.empty() ? any_size() : *rc::gen::elementOf(only);
   Camera left = any_camera("left", kind, size), right = any_camera("right", kind, sizes ? any_size() : size);
   Pose right_from_left = Pose::from_translation({-between(0.01, 2), 0, 0});
   if (rectified) {
@@ -214,7 +222,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, EveryFormatPreservesWhatItSupports, ()) {
   const std::string kind = *rc::gen::elementOf(format_case.models);
   const bool body = format_case.body && (!format_case.left_camera || *rc::gen::arbitrary<bool>());
   const bool rectified = is_rectified(format_case.format);
-  const Rig rig = any_rig(kind, body, rectified, format_case.sizes);
+  const Rig rig = any_rig(kind, body, rectified, format_case.sizes, format_case.only);
   RC_PRE(rig.validation_errors().empty());
   RC_CLASSIFY(true, std::string(format_case.path) + " " + kind);
   const TemporaryFolder folder;
@@ -234,7 +242,8 @@ RC_GTEST_PROP(CalibrationRoundTrip, ChainsLoseNothing, ()) {
   const bool by_body = a.body && b.body, by_left = a.left_camera && b.left_camera;
   RC_PRE(held && (by_body || by_left));
   const Rig rig = any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()),
-                          is_rectified(a.format) || is_rectified(b.format), a.sizes && b.sizes);
+                          is_rectified(a.format) || is_rectified(b.format), a.sizes && b.sizes,
+                          a.only.empty() ? b.only : a.only);
   RC_PRE(rig.validation_errors().empty());
   const TemporaryFolder first, second, third;
   const auto of_a = round_trip(rig, a, first);

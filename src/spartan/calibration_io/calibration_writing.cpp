@@ -92,6 +92,8 @@ Result<CalibrationFiles> write_as(const Rig& rig, CalibrationFormat format, cons
       return write_tsai_calib(rig, path);
     case CalibrationFormat::cahvor:
       return write_cahvor_calib(rig, path);
+    case CalibrationFormat::zed:
+      return write_zed_calib(rig, path);
   }
   return failure(ErrorCode::internal, "unknown calibration format");
 }

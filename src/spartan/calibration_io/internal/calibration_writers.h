@@ -9,6 +9,7 @@ namespace spartan::internal {
 Result<CalibrationFiles> write_kitti_calib(const Rig& rig, const std::string& path);
 Result<CalibrationFiles> write_kitti_raw_calib(const Rig& rig, const std::string& path);
 Result<CalibrationFiles> write_middlebury_calib(const Rig& rig, const std::string& path);
+Result<CalibrationFiles> write_zed_calib(const Rig& rig, const std::string& path);
 Result<CalibrationFiles> write_euroc_calib(const Rig& rig, const std::string& folder);
 Result<CalibrationFiles> write_kalibr_calib(const Rig& rig, const std::string& path);
 Result<CalibrationFiles> write_opencv_calib(const Rig& rig, const std::string& path);
