@@ -113,7 +113,8 @@
 
   window.makeScene = element => {
     const renderer = new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
-    renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    const fullRatio = Math.min(window.devicePixelRatio, 2);
+    renderer.setPixelRatio(fullRatio);
     element.append(renderer.domElement);
     const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(45, 1, 0.05, 5000);
     camera.up.set(0, 0, 1);
@@ -127,16 +128,41 @@
     const marker = rover(), lines = {}, limits = {};
     scene.add(marker);
     let terrain = null, map = null, layer = 'colour', framed = false, mapFramed = false, following = false, asked = false, frames = null, now = 0;
-    let drawn = 0;
+    let drawn = 0, moving = false, movingRatio = fullRatio, rest = null;
 
+    // Without a graphics card the time of a frame is that of its pixels: while the view moves there are fewer of them,
+    // as many as make frames of about kFrame_ms, and all of them again when it rests.
+    const kFrame_ms = 33, kSlow_ms = 50, kFast_ms = 20, kLeastRatio = 0.25, kRest_ms = 400;
+    const setRatio = ratio => {
+      if (renderer.getPixelRatio() !== ratio) renderer.setPixelRatio(ratio);
+    };
+    const adapt = frame_ms => {
+      if (!moving || (frame_ms < kSlow_ms && frame_ms > kFast_ms)) return;
+      const ratio = movingRatio * Math.min(Math.sqrt(kFrame_ms / frame_ms), 1.25);
+      movingRatio = Math.min(Math.max(ratio, Math.min(kLeastRatio, fullRatio)), fullRatio);
+    };
+    const stopMoving = () => {
+      moving = false;
+      ask();
+    };
     const draw = () => {
       asked = false;
+      setRatio(moving ? movingRatio : fullRatio);
+      const begin = performance.now();
       renderer.render(scene, camera);
       ++drawn;
+      if (!moving) return;
+      requestAnimationFrame(() => adapt(performance.now() - begin));
+      clearTimeout(rest);
+      rest = setTimeout(stopMoving, kRest_ms);
     };
     const ask = () => {
       if (!asked) requestAnimationFrame(draw);
       asked = true;
+    };
+    const move = () => {
+      moving = true;
+      ask();
     };
     const resize = () => {
       const {clientWidth: width, clientHeight: height} = element;
@@ -149,7 +175,7 @@
       ++drawn;
     };
     new ResizeObserver(resize).observe(element);
-    controls.addEventListener('change', ask);
+    controls.addEventListener('change', move);
     element.addEventListener('pointerdown', () => element.focus());  // which OrbitControls prevents
     element.addEventListener('keydown', event => {
       const by = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
@@ -265,7 +291,7 @@
             controls.update();
           }
         }
-        ask();
+        move();
       },
       colourBy(name) {
         layer = name;
@@ -286,16 +312,15 @@
       repaint() {
         if (frames) api.setFrames(frames);
       },
-      // Of a test: draws so many frames while the camera turns, and returns the time of each in ms.
+      // Of a test: turns the camera by so many frames, and returns the time of each in ms.
       async measure(count) {
         const times = [];
         let last = performance.now();
         for (let i = 0; i < count; ++i) {
-          await new Promise(done => requestAnimationFrame(done));
           const offset = camera.position.clone().sub(controls.target).applyAxisAngle(new THREE.Vector3(0, 0, 1), 0.02);
           camera.position.copy(controls.target).add(offset);
-          controls.update();
-          renderer.render(scene, camera);
+          controls.update();                                           // asks for a frame
+          await new Promise(done => requestAnimationFrame(done));      // which is drawn before
           renderer.getContext().finish();
           times.push(performance.now() - last);
           last = performance.now();
@@ -317,7 +342,7 @@
         made.append(text(span[0]), bar, text(span[1]));
         box.append(made);
       },
-      state: () => ({drawn, vertices: terrain ? terrain.geometry.getAttribute('position').count : 0, time: now,
+      state: () => ({drawn, pixelRatio: renderer.getPixelRatio(), vertices: terrain ? terrain.geometry.getAttribute('position').count : 0, time: now,
         rover: marker.position.toArray(), lines: Object.keys(lines)}),
     };
     resize();
