@@ -202,9 +202,16 @@ def check_page(page, width):
     check(colours > 50, f"{width} px: the scene is blank, {colours} colours")
     check(page.evaluate("() => document.documentElement.scrollWidth <= window.innerWidth"), f"{width} px: nothing is wider")
     check(page.evaluate("() => spartan.plots.count()") > 5, f"{width} px: plots")
-    blank = page.evaluate("""() => [...document.querySelectorAll('.plot canvas')].filter(c =>
-      !c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v)).length""")
-    check(blank == 0, f"{width} px: {blank} plots are blank")
+    blank = page.evaluate("""() => [...document.querySelectorAll('.plot')].filter(plot => {
+      const c = plot.querySelector('canvas'), data = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+      for (let i = 0; i < data.length; i += 4) {  // frame and time are gray, series and states are not
+        if (data[i + 3] > 200 && Math.max(data[i], data[i + 1], data[i + 2]) - Math.min(data[i], data[i + 1], data[i + 2]) > 60) return false;
+      }
+      return true;
+    }).map(plot => plot.querySelector('b').textContent)""")
+    missing = [name for name, states in page.evaluate("() => fetch('/api/frames?from=0').then(a => a.json())")["sensors"].items()
+               if set(states) <= {"missing", None}]
+    check(set(blank) <= set(missing), f"{width} px: the plots {blank} are blank, and only the sensors {missing} are missing")
     check("Innovation: " in page.inner_text("#plots"), f"{width} px: innovations are plotted")
 
     before = page.evaluate("() => spartan.scene.state().rover")
@@ -261,8 +268,10 @@ def check_in_browser(program, run, recording, screenshots):
                         take_screenshot(page, screenshots / f"view_{width}_{scheme}.png", width)
         check(not browser.told, f"the console tells nothing: {browser.told}")
         with browser.page(1600) as page:
-            times = sorted(page.evaluate("() => spartan.scene.measure(60)")[20:])
+            turning = page.evaluate("() => spartan.scene.measure(60)")
+            times = sorted(turning[20:])
             ratio = page.evaluate("() => spartan.scene.state().pixelRatio")
+            check(ratio < 1 or sorted(turning[:10])[5] < 70, f"frames of {turning[:10]} ms are drawn with all pixels")
             page.wait_for_function("() => spartan.scene.state().pixelRatio === window.devicePixelRatio", timeout=20000)
             show = page.evaluate("""() => { const begin = performance.now(), n = spartan.state().total;
               for (let i = 0; i < 20; ++i) { const t = document.getElementById('time'); t.value = Math.floor(i * n / 20); t.dispatchEvent(new Event('input')); }
@@ -327,6 +336,8 @@ def main():
         if sync_playwright is None or CHROMIUM is None:
             print("not tried: Chromium or Playwright is not installed (./setup docs)")
             return 0
+        if AXE is None:
+            print("not tried: accessibility, axe-core is not installed (./setup docs)")
         if a.screenshots:
             a.screenshots.mkdir(exist_ok=True)
         recording = a.run / "live/1" if a.run else drive

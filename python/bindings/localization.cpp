@@ -32,7 +32,7 @@ void bind_estimate(nb::module_& m) {
   nb::class_<InnovationTest>(m, "InnovationTest",
                              "Chi-square test of an innovation: the measurement may be used where `nis` is at most `gate`.")
       .def_prop_ro("stamp_ns", [](const InnovationTest& t) { return t.stamp.ns; })
-      .def_ro("nis", &InnovationTest::nis, "Normalized innovation squared, rᵀ S⁻¹ r.")
+      .def_ro("nis", &InnovationTest::nis, "Normalized innovation squared, rᵀ S⁻¹ r; the largest float where S is singular.")
       .def_ro("gate", &InnovationTest::gate)
       .def("__repr__", [](const InnovationTest& t) { return fmt::format("<NIS {:.3g}, gate {:.3g}>", t.nis, t.gate); });
   nb::class_<SensorHealth>(m, "SensorHealth", "Whether a sensor is used, and why not.")

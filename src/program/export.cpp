@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <cstddef>
 #include <memory>
+#include <vector>
 
 #include "program/commands.h"
 #include "program/recording_arguments.h"
@@ -13,6 +15,7 @@ namespace {
 struct ExportArguments {
   std::string run, format, output, trajectory, recording;
   RecordingArguments reading;
+  std::vector<const CLI::Option*> of_recording;
   bool list = false;
 };
 
@@ -51,8 +54,10 @@ Result<ExitCode> export_command(const Context& context, const ExportArguments& a
   const ThreadPool workers(context.threads);
   if (*format == ExportFormat::colmap && !arguments.recording.empty())
     return export_images(context, arguments, kind, workers);
-  if (!arguments.recording.empty())
-    return failure(ErrorCode::usage, "is of --format colmap only", "--recording", "leave it out");
+  for (const CLI::Option* option : arguments.of_recording) {
+    if (option->count() > 0)
+      return failure(ErrorCode::usage, "is of --format colmap with --recording only", option->get_name(), "leave it out");
+  }
   if (Status s = expect_new_file(context, arguments.output); !s) return failure(s);
   if (Status s = export_run(arguments.run, *format, kind, workers, arguments.output); !s) return failure(s);
   return kDone;
@@ -75,11 +80,15 @@ void add_export(CLI::App& app, Context& context) {
       ->add_option("--trajectory", a->trajectory,
                    "Trajectory: odometry, slam or localization (default: the last of these that exists), or smoothed.")
       ->check(CLI::IsMember({"odometry", "slam", "localization", "smoothed"}));
+  const std::size_t others = command->get_options().size();
   command->add_option("--recording", a->recording,
                       "Recording that was run, whose images colmap needs (default: none); of a live run RUN/live/1, "
-                      "and after a resume the next number. Its layout is detected.");
+                      "and after a resume the next number.");
+  command->add_option("--recording-format", a->reading.format, "Its layout, as --format of `run` (default: detected).");
   command->add_option("--rig", a->reading.rig, "Calibration file of the recording (default: the recording's own).");
   add_recorded_frames_options(*command, a->reading);
+  const std::vector<CLI::Option*> options = command->get_options();
+  a->of_recording.assign(options.begin() + static_cast<std::ptrdiff_t>(others), options.end());
   add_force_flag(*command, context);
   add_threads_option(*command, context);
 }

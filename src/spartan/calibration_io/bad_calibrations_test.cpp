@@ -25,6 +25,7 @@ struct Case {
   Format format;
   const char* path;
   CameraModel model;
+  ImageSize size = kSize;
 };
 
 std::vector<Case> cases() {
@@ -43,6 +44,7 @@ std::vector<Case> cases() {
           {Format::ros, "camera_info.yaml", brown},
           {Format::mrcal, "pair.cameramodel", cahvor},
           {Format::tsai, "pair.tsai", brown},
+          {Format::zed, "SN1.conf", brown, {672, 376}},
           {Format::cahvor, "pair.cahvore", fisheye}};
 }
 
@@ -53,7 +55,7 @@ class Files {
     Camera left, right;
     left.name = "left";
     right.name = "right";
-    left.size = right.size = kSize;
+    left.size = right.size = of.size;
     left.model = right.model = of.model;
     Rig rig = rig_of_one_pair("r", left, right, Pose::from_translation({-0.12, 0, 0}));
     if (of.format == Format::kitti_raw || of.format == Format::kalibr || of.format == Format::euroc) {
@@ -74,7 +76,7 @@ class Files {
   }
   Result<LoadedRig> read() const {
     const bool two = has_file_per_camera(of_.format);
-    return read_calibration(two ? files_[0].path + "," + files_[1].path : files_[0].path, kSize);
+    return read_calibration(two ? files_[0].path + "," + files_[1].path : files_[0].path, of_.size);
   }
   // Reads the files: "accepted" for a valid rig, otherwise the message of an error that must name the folder.
   std::string outcome() const {
@@ -133,7 +135,7 @@ std::vector<std::pair<std::size_t, std::size_t>> numbers_in(const std::string& t
   for (std::size_t at = 0; at < text.size();) {
     const bool begins = (text[at] >= '0' && text[at] <= '9') ||
                         (text[at] == '-' && at + 1 < text.size() && text[at + 1] >= '0' && text[at + 1] <= '9');
-    const bool alone = at == 0 || std::string(" [,\n>").find(text[at - 1]) != std::string::npos;
+    const bool alone = at == 0 || std::string(" [,\n>=").find(text[at - 1]) != std::string::npos;
     if (!begins || !alone) {
       ++at;
       continue;

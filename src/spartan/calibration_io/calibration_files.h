@@ -88,7 +88,7 @@ Result<Rig> read_kitti_raw_calib(const std::string& path, KittiPair pair = Kitti
 Result<LoadedRig> read_middlebury_calib(const std::string& path);
 
 /// SN….conf of a ZED camera: the cameras of one of its resolutions, `size`; that of the file where it has one only and
-/// `size` is empty. Not those of fisheye lenses.
+/// `size` is empty. Lenses with five or eight coefficients, or those of cv::fisheye.
 Result<LoadedRig> read_zed_calib(const std::string& path, ImageSize size = {});
 
 /// EuRoC/ASL: `mav0/cam0/sensor.yaml`, `mav0/cam1/sensor.yaml` and further cameras; the body is the body frame of

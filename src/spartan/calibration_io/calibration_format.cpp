@@ -44,7 +44,6 @@ std::optional<CalibrationFormat> format_of_extension(const std::string& extensio
   if (extension == ".cahv" || extension == ".cahvor" || extension == ".cahvore") return CalibrationFormat::cahvor;
   if (extension == ".cameramodel") return CalibrationFormat::mrcal;
   if (extension == ".xml") return CalibrationFormat::opencv;
-  if (extension == ".conf") return CalibrationFormat::zed;
   return std::nullopt;
 }
 
@@ -79,6 +78,7 @@ bool contains_image_size(CalibrationFormat format) {
 std::optional<CalibrationFormat> detect_calibration_format(const std::string& path, const std::string& text) {
   const std::string extension = std::filesystem::path(path).extension().string();
   if (const auto format = format_of_extension(extension)) return format;
+  if (has_line(text, "[LEFT_CAM_") || has_line(text, "[left_cam_")) return CalibrationFormat::zed;
   if (has_line(text, "P_rect_00:")) return CalibrationFormat::kitti_raw;
   if (has_line(text, "P0:")) return CalibrationFormat::kitti;
   if (has_line(text, "cam0=[") || has_line(text, "cam0 = [")) return CalibrationFormat::middlebury;
@@ -107,6 +107,7 @@ Result<CalibrationFormat> calibration_format_for_path(const std::string& path) {
     return CalibrationFormat::ros;
   }
   if (extension == ".yml") return CalibrationFormat::opencv;
+  if (extension == ".conf") return CalibrationFormat::zed;
   if (extension == ".yaml") return CalibrationFormat::rig_yaml;
   if (extension.empty() || std::filesystem::is_directory(file, error)) return CalibrationFormat::euroc;
   return failure(ErrorCode::usage, "the file name does not determine the format", path,

@@ -60,6 +60,15 @@ Result<LoadedRig> read_opencv_files(const fs::path& file, ImageSize size_hint) {
   return internal::read_opencv(first.string(), separate ? extrinsics.string() : "", *size);
 }
 
+// The images beside a file tell which of its cameras are meant, where it has more than those of one size.
+Result<LoadedRig> read_zed_file(const fs::path& file, ImageSize size_hint) {
+  auto read = read_zed_calib(file.string(), size_hint);
+  if (read || !size_hint.empty()) return read;
+  const auto size = size_of_images_beside(file);
+  if (!size) return failure(size);
+  return size->empty() ? read : read_zed_calib(file.string(), *size);
+}
+
 Result<LoadedRig> read_file_per_camera(CalibrationFormat format, const std::string& path, ImageSize size_hint) {
   const auto pair = find_pair_of_files(path);
   if (!pair) return failure(pair);
@@ -89,11 +98,8 @@ Result<LoadedRig> read_as(CalibrationFormat format, const std::string& path, Ima
     }
     case CalibrationFormat::middlebury:
       return read_middlebury_calib(path);
-    case CalibrationFormat::zed: {
-      const auto size = size_hint.empty() ? size_of_images_beside(file) : size_hint;
-      if (!size) return failure(size);
-      return read_zed_calib(path, *size);
-    }
+    case CalibrationFormat::zed:
+      return read_zed_file(file, size_hint);
     case CalibrationFormat::kalibr:
       return read_kalibr_calib(path);
     case CalibrationFormat::opencv:
@@ -112,6 +118,12 @@ bool is_opencv_file(const fs::path& file) {
          detect_calibration_format(file.string(), *text) == CalibrationFormat::opencv;
 }
 
+bool is_zed_file(const fs::path& file) {
+  if (file.extension() != ".conf") return false;
+  const auto text = read_calibration_text(file.string());
+  return text && detect_calibration_format(file.string(), *text) == CalibrationFormat::zed;
+}
+
 // The calibration in a folder: first the file names of known recordings, then a unique candidate.
 Result<std::string> find_in_folder(const fs::path& folder) {
   for (const char* name : {"rig.yaml", "calib.txt", "calib_cam_to_cam.txt", "cam0/sensor.yaml", "mav0/cam0/sensor.yaml",
@@ -128,7 +140,7 @@ Result<std::string> find_in_folder(const fs::path& folder) {
     const bool yaml = extension == ".yaml" || extension == ".yml";
     const bool is_camchain = yaml && name.find("camchain") != std::string::npos;
     const bool of_ros = name == "left.yaml" && path_exists(folder / "right.yaml");
-    if (of_one_camera || is_camchain || of_ros || is_opencv_file(folder / name))
+    if (of_one_camera || is_camchain || of_ros || is_opencv_file(folder / name) || is_zed_file(folder / name))
       candidates.push_back((folder / name).string());
   }
   if (candidates.size() == 1) return candidates.front();
@@ -142,7 +154,7 @@ Result<std::string> find_in_folder(const fs::path& folder) {
   return failure(
       ErrorCode::configuration,
       "contains no calibration: looked for rig.yaml, calib.txt, calib_cam_to_cam.txt, cam0/sensor.yaml, a camchain, "
-      "OpenCV matrices and files of two cameras",
+      "OpenCV matrices, a ZED's .conf and files of two cameras",
       folder.string());
 }
 

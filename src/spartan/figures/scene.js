@@ -128,20 +128,26 @@
     const marker = rover(), lines = {}, limits = {};
     scene.add(marker);
     let terrain = null, map = null, layer = 'colour', framed = false, mapFramed = false, following = false, asked = false, frames = null, now = 0;
-    let drawn = 0, moving = false, movingRatio = fullRatio, rest = null;
+    let drawn = 0, stepped = 0, moving = false, movingRatio = fullRatio, rest = null;
 
     // Without a graphics card the time of a frame is that of its pixels: while the view moves there are fewer of them,
     // as many as make frames of about kFrame_ms, and all of them again when it rests.
-    const kFrame_ms = 33, kSlow_ms = 50, kFast_ms = 20, kLeastRatio = 0.25, kRest_ms = 400;
+    const kFrame_ms = 33, kSlow_ms = 50, kLeastRatio = 0.25, kRest_ms = 400;
+    let shortest_ms = 1000;  // the interval of the display
     const setRatio = ratio => {
       if (renderer.getPixelRatio() !== ratio) renderer.setPixelRatio(ratio);
     };
     const adapt = frame_ms => {
-      if (!moving || (frame_ms < kSlow_ms && frame_ms > kFast_ms)) return;
-      const ratio = movingRatio * Math.min(Math.sqrt(kFrame_ms / frame_ms), 1.25);
-      movingRatio = Math.min(Math.max(ratio, Math.min(kLeastRatio, fullRatio)), fullRatio);
+      if (document.hidden) return;
+      shortest_ms = Math.min(shortest_ms, Math.max(frame_ms, 4));
+      const factor = frame_ms > kSlow_ms ? Math.max(Math.sqrt(kFrame_ms / frame_ms), 0.6) : frame_ms < 1.5 * shortest_ms ? 1.1 : 1;
+      movingRatio = Math.min(Math.max(factor * movingRatio, Math.min(kLeastRatio, fullRatio)), fullRatio);
     };
     const stopMoving = () => {
+      if (asked) {
+        rest = setTimeout(stopMoving, kRest_ms);
+        return;
+      }
       moving = false;
       ask();
     };
@@ -152,9 +158,12 @@
       renderer.render(scene, camera);
       ++drawn;
       if (!moving) return;
-      requestAnimationFrame(() => adapt(performance.now() - begin));
       clearTimeout(rest);
-      rest = setTimeout(stopMoving, kRest_ms);
+      requestAnimationFrame(() => {
+        adapt(performance.now() - begin);
+        clearTimeout(rest);
+        rest = setTimeout(stopMoving, kRest_ms);
+      });
     };
     const ask = () => {
       if (!asked) requestAnimationFrame(draw);
@@ -291,7 +300,9 @@
             controls.update();
           }
         }
-        move();
+        const steps = performance.now() - stepped < kRest_ms;  // the slider is drawn, or it plays
+        stepped = performance.now();
+        if (steps) move(); else ask();
       },
       colourBy(name) {
         layer = name;

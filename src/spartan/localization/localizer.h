@@ -84,7 +84,7 @@ struct RefusalCounts {
 /// Chi-square test of an innovation: the measurement may be used where `nis` is at most `gate`.
 struct InnovationTest {
   Stamp stamp;     ///< of the state that it was tested against
-  double nis = 0;  ///< normalized innovation squared, rᵀ S⁻¹ r; at most the largest double
+  double nis = 0;  ///< normalized innovation squared, rᵀ S⁻¹ r; the largest double where S is singular
   double gate = 0;
 };
 

@@ -1,12 +1,15 @@
 #include <fmt/format.h>
 
+#include <limits>
+#include <string>
+
 #include "spartan/localization/localizer.h"
 
 namespace spartan {
 namespace {
 
 std::string text_of(double nis) {
-  return nis < 1e9 ? fmt::format("{:.1f}", nis) : fmt::format("{:.1e}", nis);
+  return nis < std::numeric_limits<double>::max() ? fmt::format("{:.1f}", nis) : "infinite";
 }
 
 }  // namespace

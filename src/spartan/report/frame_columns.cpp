@@ -94,7 +94,7 @@ std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t fr
     if (!frame.localization) continue;
     for (const LocalizationRecord::Sensor& sensor : frame.localization->sensors) {
       add_named(columns["sensors"], sensor.name, sensor.state, i - from);
-      if (!sensor.test || !(sensor.test->gate > 0)) continue;
+      if (!sensor.test) continue;
       constexpr double kMost = 1e6;  // the quotient of a singular covariance has no meaning
       const double quotient = std::min(sensor.test->nis / sensor.test->gate, kMost);
       add_named(columns["innovations"], sensor.name, rounded(quotient, 1e-4), i - from);

@@ -13,7 +13,7 @@
 namespace spartan {
 namespace {
 
-constexpr int kPageBytes = 512;  // a frame adds about 0.5 kB to each of six tables
+constexpr int kPageBytes = 512;  // a frame adds at most about 0.5 kB to each of several tables
 // Pages in the write-ahead log that are copied into the database at once (2 MB): what is written again and again, such
 // as the state of the pipeline, is copied once. With 16 MB no byte less is written, but the end of a run copies them.
 constexpr int kLogPages = 4096;

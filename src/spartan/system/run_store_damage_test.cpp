@@ -33,7 +33,8 @@ RunStore::Step full_step(int i) {
   frame.slam = pose;
   LocalizationRecord& localization = frame.localization.emplace();
   localization.world_from_body = localization.odom_from_body = pose;
-  localization.sensors = {{"vision", "ok", ""}};
+  localization.sensors = {{"vision", "ok", "", InnovationTest{frame.stamp, 3, 22}}};
+  frame.latency_ms = 20;
   step.terrain = TerrainRecord{frame.stamp, "narrow", 91.5, 1234};
   MapRecord& map = step.map.emplace();
   map.stamp = frame.stamp;
@@ -100,6 +101,11 @@ TEST_F(DamagedRunStore, IsNamedWithItsTable) {
            {"UPDATE localization SET odom_covariance = x'00'", "table 'localization': a pose"},
            {"UPDATE health SET state = 'fine'", "table 'health'"},
            {"UPDATE health SET seq = 4 - seq", "rows are not in the order of the frames"},
+           {"UPDATE innovations SET nis = 1e999", "table 'innovations'"},
+           {"UPDATE innovations SET nis = -1", "table 'innovations'"},
+           {"UPDATE innovations SET gate = 0", "table 'innovations'"},
+           {"UPDATE innovations SET seq = 4 - seq", "rows are not in the order of the frames"},
+           {"UPDATE latencies SET wall_ms = -1", "table 'latencies'"},
            {"UPDATE stage_times SET seq = 4 - seq", "rows are not in the order of the frames"},
            {"UPDATE maps SET pose = x'00'", "table 'maps': a pose"},
            {"UPDATE maps SET believed_covariance = x'00'", "table 'maps': a pose"},
@@ -131,6 +137,25 @@ TEST_F(DamagedRunStore, RowsOfFramesThatAreNotThereAreLeftOut) {
   EXPECT_EQ(frames->back().frame_id, 2);
   EXPECT_EQ(frames->back().times.size(), 1U) << "its own";
   EXPECT_EQ(frames->back().localization->sensors.size(), 1U);
+}
+
+TEST_F(DamagedRunStore, OlderVersionsHadNoInnovationsAndLatencies) {
+  renew();
+  damage("DROP TABLE innovations");
+  damage("DROP TABLE latencies");
+  {
+    auto store = RunStore::open_read_only(path_);
+    ASSERT_TRUE(store) << store.error().message();
+    const auto frames = store->frames();
+    ASSERT_TRUE(frames) << frames.error().message();
+    EXPECT_FALSE(frames->back().latency_ms);
+    EXPECT_FALSE(frames->back().localization->sensors[0].test);
+  }
+  auto store = RunStore::resume(path_, kStored);
+  ASSERT_TRUE(store) << store.error().message();
+  const Status written = commit_step(*store, 3);
+  ASSERT_TRUE(written) << written.error().message();
+  EXPECT_EQ(store->frames()->back().latency_ms, 20);
 }
 
 TEST_F(DamagedRunStore, IsNotResumedAsAnotherRun) {

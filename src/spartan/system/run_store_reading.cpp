@@ -107,7 +107,7 @@ std::optional<LocalizationRecord> localization_of(const SqlStatement& row) {
 
 bool add_innovation(const SqlStatement& row, FrameRecord& frame) {
   const InnovationTest test{Stamp{row.integer(2)}, row.real(3), row.real(4)};
-  if (!std::isfinite(test.nis) || !std::isfinite(test.gate) || test.nis < 0) return false;
+  if (!std::isfinite(test.nis) || !std::isfinite(test.gate) || test.nis < 0 || !(test.gate > 0)) return false;
   if (!frame.localization) return true;
   for (LocalizationRecord::Sensor& sensor : frame.localization->sensors) {
     if (sensor.name == row.text(1)) sensor.test = test;
@@ -134,7 +134,7 @@ constexpr FrameTable kFrameTables[] = {
     {"latencies", "SELECT seq, wall_ms FROM latencies ORDER BY seq", true,
      [](const SqlStatement& row, FrameRecord& frame) {
        frame.latency_ms = row.real(1);
-       return std::isfinite(*frame.latency_ms);
+       return std::isfinite(*frame.latency_ms) && *frame.latency_ms >= 0;
      }},
     {"slam", "SELECT * FROM slam ORDER BY seq", false,
      [](const SqlStatement& row, FrameRecord& frame) {

@@ -303,7 +303,8 @@ void fill(const std::string& path, int doublings) {
   ASSERT_TRUE(db);
   ASSERT_TRUE(db->execute("BEGIN"));
   for (int i = 0; i < doublings; ++i) {
-    for (const std::string table : {"frames", "stage_times", "localization", "slam", "health"}) {
+    for (const std::string table :
+         {"frames", "stage_times", "latencies", "localization", "slam", "health", "innovations"}) {
       const Status doubled = db->execute(
           fmt::format("CREATE TEMP TABLE more AS SELECT * FROM {0} ORDER BY rowid; UPDATE more SET seq = seq + {1}; "
                       "INSERT INTO {0} SELECT * FROM more ORDER BY rowid; DROP TABLE more",

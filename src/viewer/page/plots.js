@@ -48,15 +48,22 @@
         context.strokeStyle = css(series.colour);
         context.lineWidth = 1.5 * scale;
         context.setLineDash(series.dash ? series.dash.map(d => d * scale) : []);
-        context.beginPath();
-        let drawing = false;
+        const points = [];
         series.columns.forEach((value, x) => {
-          if (value === null) return;
-          const y = height - 2 - Math.min(value / top, 1) * (height - 4);
-          if (drawing) context.lineTo(x, y); else context.moveTo(x, y);
-          drawing = true;
+          if (value !== null) points.push({x, y: height - 2 - Math.min(value / top, 1) * (height - 4), above: plot.limit && value > plot.limit});
         });
-        context.stroke();
+        if (!plot.limit) {
+          context.beginPath();
+          points.forEach(({x, y}, i) => i > 0 ? context.lineTo(x, y) : context.moveTo(x, y));
+          context.stroke();
+          if (points.length > 1) continue;
+        }
+        // Tests are single events; those beyond the plot are at its upper edge.
+        const side = 2 * scale;
+        for (const {x, y, above} of points) {
+          context.fillStyle = css(above ? '--red' : series.colour);
+          context.fillRect(x - side / 2, y - side / 2, above ? 1.5 * side : side, above ? 1.5 * side : side);
+        }
       }
       context.setLineDash([]);
     };

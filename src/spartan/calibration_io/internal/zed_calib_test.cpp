@@ -1,8 +1,9 @@
-// ZED: a file as the maker's, against cv::stereoRectify as the maker's program calls it.
+// ZED: files as Stereolabs' programs write them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <opencv2/calib3d.hpp>
+#include <string>
 
 #include "spartan/calibration_io/calibration_files.h"
 #include "spartan/rig/models/camera_model.h"
@@ -46,31 +47,51 @@ TEST_F(ZedCalib, CamerasAreThoseOfTheImageSize) {
   EXPECT_EQ(half->rig.cameras[1].size, ImageSize(1280, 720));
 }
 
-// x_right = R x_left + T is the geometry that the maker rectifies by: its T has the other sign, which rectifies alike.
-TEST_F(ZedCalib, RectifiesAsTheMakersProgram) {
+// As zed-opencv-calibration writes it: Baseline = −T(0), TY = T(1), TZ = T(2), Rodrigues(R) = (RX, CV, RZ).
+TEST_F(ZedCalib, GeometryIsThatOfOpenCvWithANegativeBaseline) {
   const Rig rig = read(kZed).value().rig;
   const Pose right_from_left = rig.right_from_left(rig.pairs[0]);
-  EXPECT_LE((right_from_left.translation() - Eigen::Vector3d(-0.1195, -0.00125, 0.0025)).norm(), 1e-15);
-  const cv::Matx33d left(700.25, 0, 641.25, 0, 700.125, 344, 0, 0, 1), right(701, 0, 633, 0, 700.5, 359, 0, 0, 1);
-  const cv::Vec4d left_k(-0.17, 0.026, 0, 0), right_k(-0.171, 0.027, 0, 0);
-  cv::Mat rotation;
+  EXPECT_LE((right_from_left.translation() - Eigen::Vector3d(-0.1195, 0.00125, -0.0025)).norm(), 1e-15);
+  cv::Matx33d rotation;
   cv::Rodrigues(cv::Vec3d(-0.004, 0.006, 0.0015), rotation);
-  const auto rectify = [&](const cv::Mat& r, const cv::Vec3d& t) {
-    std::array<cv::Mat, 5> out;
-    cv::stereoRectify(left, left_k, right, right_k, {1280, 720}, r, t, out[0], out[1], out[2], out[3], out[4],
-                      cv::CALIB_ZERO_DISPARITY, 0, {1280, 720});
-    return out;
-  };
-  const auto makers = rectify(rotation, {119.5, 1.25, -2.5});
-  cv::Mat own(3, 3, CV_64F);
   const Eigen::Matrix3d matrix = right_from_left.rotation_matrix();
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) own.at<double>(row, column) = matrix(row, column);
+    for (int column = 0; column < 3; ++column) EXPECT_NEAR(matrix(row, column), rotation(row, column), 1e-12);
   }
-  const Eigen::Vector3d& t = right_from_left.translation();
-  const auto ours = rectify(own, {t.x(), t.y(), t.z()});
-  for (std::size_t i : {0U, 1U, 2U}) EXPECT_LE(cv::norm(makers[i], ours[i], cv::NORM_INF), 1e-9) << i;
-  EXPECT_LT(ours[3].at<double>(0, 3), 0) << "the right camera is to the right";
+}
+
+TEST_F(ZedCalib, OldFilesHaveNoOffsetsAndNewOnesThoseOfAResolution) {
+  const auto right_at = [&](const std::string& text) {
+    const Rig rig = read(text).value().rig;
+    return rig.right_from_left(rig.pairs[0]).translation();
+  };
+  const std::string old = replaced(replaced(kZed, "TY=1.25\n", ""), "TZ=-2.5\n", "");
+  EXPECT_LE((right_at(old) - Eigen::Vector3d(-0.1195, 0, 0)).norm(), 1e-15);
+  EXPECT_LE((right_at(replaced(kZed, "TY=1.25\n", "TY=1.25\nTY_HD=1.5\n")) - Eigen::Vector3d(-0.1195, 0.0015, -0.0025)).norm(), 1e-15);
+}
+
+TEST_F(ZedCalib, SectionsOfDistortionHoldForAllResolutions) {
+  const std::string rational = kZed + "\n [LEFT_DISTO]\nk1 = 1\nk2 = 2\np1 = 3\np2 = 4\nk3 = 5\nk4 = 6\nk5 = 7\nk6 = 8\n";
+  const auto read_rational = read(rational);
+  ASSERT_TRUE(read_rational) << read_rational.error().message();
+  EXPECT_EQ(read_rational->rig.cameras[0].model,
+            CameraModel(RadialTangentialModel({700.25, 700.125, 641.25, 344}, {1, 2, 3, 4, 5, 6, 7, 8})));
+  EXPECT_EQ(read_rational->rig.cameras[1].model,
+            CameraModel(RadialTangentialModel({701, 700.5, 633, 359}, {-0.171, 0.027})));
+  const std::string fisheye =
+      kZed + "\n[LEFT_DISTO]\nk1=0.1\nk2=0.2\nk3=0.03\nk4=0.04\nk5=0\nk6=0\np1=0\np2=0\n";
+  EXPECT_EQ(read(fisheye).value().rig.cameras[0].model,
+            CameraModel(EquidistantModel({700.25, 700.125, 641.25, 344}, {0.1, 0.2, 0.03, 0.04})));
+}
+
+TEST_F(ZedCalib, AFolderIsItsFile) {
+  folder_.write("SN8452.conf", kZed);
+  folder_.write("other.conf", "[server]\nport=80\n");
+  const auto rig = read_calibration(folder_.path(), {1280, 720});
+  ASSERT_TRUE(rig) << rig.error().message();
+  EXPECT_EQ(rig->format, CalibrationFormat::zed);
+  EXPECT_THAT(error_message(read_calibration(folder_.path() + "/other.conf")), HasSubstr("of a known format"));
+  EXPECT_THAT(error_message(read_zed_calib(folder_.path() + "/other.conf")), HasSubstr("no section as [LEFT_CAM_HD]"));
 }
 
 TEST_F(ZedCalib, AFileOfOneSizeNeedsNoImages) {
@@ -93,12 +114,17 @@ TEST_F(ZedCalib, ErrorsAreSpecific) {
     return error_message(read(replaced(kZed, what, with)));
   };
   EXPECT_THAT(error_message(read(kZed, {640, 480})), HasSubstr("has no cameras of 640x480 pixels, but of 1920x1080, "));
-  EXPECT_THAT(error_message(read(kCameras)), HasSubstr("the section [stereo] is missing"));
-  EXPECT_THAT(message_for("[RIGHT_CAM_HD]", "[RIGHT_CAM_VGA]"), HasSubstr("the section [right_cam_hd] is missing"));
+  EXPECT_THAT(error_message(read(kCameras)), HasSubstr("the section [STEREO] is missing"));
+  EXPECT_THAT(message_for("[RIGHT_CAM_HD]", "[RIGHT_CAM_VGA]"), HasSubstr("the section [RIGHT_CAM_HD] is missing"));
+  EXPECT_THAT(message_for("[MISC]", "[left_cam_hd]"), HasSubstr("SN8452.conf:50: the section [LEFT_CAM_HD] is there twice"));
   EXPECT_THAT(message_for("Baseline=119.5", "Baseline=0.1195"), HasSubstr("SN8452.conf:40: baseline: must be in milli"));
-  EXPECT_THAT(message_for("fx=700.25", "fx=-1"), HasSubstr("SN8452.conf:24: fx: the focal length must be above zero"));
+  EXPECT_THAT(message_for("TZ=-2.5", "TZ=-25000"), HasSubstr("SN8452.conf:42: tz: must be in millimetres"));
+  EXPECT_THAT(message_for("RX_HD=-0.004", "RX_HD=1.2"), HasSubstr("rx_hd: with CV and RZ must be a rotation vector"));
   EXPECT_THAT(message_for("RX_HD", "RX_VGA"), HasSubstr("the line 'rx_hd=' is missing"));
-  EXPECT_THAT(message_for("k2=0.026\n\n", "k2=0.026\nk4=0.1\n\n"), HasSubstr("k4: is of a fisheye lens"));
+  EXPECT_THAT(message_for("RX_HD", "RX_FHD"), HasSubstr("rx_fhd"));
+  EXPECT_THAT(message_for("fx=700.25", "fx=-1"), HasSubstr("SN8452.conf:24: fx: the focal length must be above zero"));
+  EXPECT_THAT(message_for("fx=700.25", "fx=nan"), HasSubstr("SN8452.conf:24"));
+  EXPECT_THAT(message_for("fx=700.25", "fx=1e300"), HasSubstr("SN8452.conf"));
 }
 
 }  // namespace

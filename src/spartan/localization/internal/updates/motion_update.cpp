@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "spartan/localization/internal/motion_composition.h"
@@ -134,7 +135,7 @@ bool MotionUpdate::update_by_motion(FilterMemory& memory, const VisualMotion& vi
   const bool velocity_was_reset = std::exchange(vision.reset, false);
   if (decision.accept_doubted) accept_doubted_motion(memory);
   vision.doubted = decision.use == MotionUse::doubt;
-  const bool accepted = accept(memory, decision);
+  const bool accepted = accept(memory, decision, evidence);
   switch (decision.use) {
     case MotionUse::doubt:
       vision.doubted_at = motion.to;
@@ -162,13 +163,11 @@ bool MotionUpdate::update_by_motion(FilterMemory& memory, const VisualMotion& vi
   return false;
 }
 
-bool MotionUpdate::accept(FilterMemory& memory, const MotionDecision& decision) const {
-  constexpr LocalizationSensor kVision = LocalizationSensor::vision;
-  const bool accepted = decision.use == MotionUse::follow
-                            ? gates_.accept_untested(memory, kVision)
-                            : gates_.accept_within(memory, kVision, decision.nis, decision.gate, decision.why);
+bool MotionUpdate::accept(FilterMemory& memory, const MotionDecision& decision, const MotionEvidence& evidence) const {
+  const std::optional<double> tested = evidence.predicted_by_imu ? std::optional(evidence.nis) : std::nullopt;
+  const bool accepted = gates_.accept_motion(memory, decision, tested);
   if (accepted && decision.uncertain) {
-    SensorMonitor& monitor = memory.monitor(kVision);
+    SensorMonitor& monitor = memory.monitor(LocalizationSensor::vision);
     monitor.state = SensorState::suspect;
     monitor.reason = HealthReason::implausible;
   }

@@ -21,7 +21,7 @@ class MotionUpdate {
 
  private:
   bool update_by_motion(FilterMemory& memory, const VisualMotion& visual) const;
-  bool accept(FilterMemory& memory, const MotionDecision& decision) const;
+  bool accept(FilterMemory& memory, const MotionDecision& decision, const MotionEvidence& evidence) const;
   void count_agreement_of_imu(FilterMemory& memory, bool velocity_was_reset) const;
   void follow(FilterMemory& memory, const VisualMotion& visual, const Matrix6d& covariance) const;
   void reset_prediction(FilterMemory& memory, const Innovation& innovation, double nis,

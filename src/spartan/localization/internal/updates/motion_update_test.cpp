@@ -43,6 +43,7 @@ TEST(MotionUpdate, WithoutAnImuThePoseFollows) {
   EXPECT_EQ(memory.vision.clone_stamp, after_start(1));
   EXPECT_LT(distance(memory.estimate.state.world_from_vision_clone, memory.estimate.state.world_from_body), 1e-12);
   EXPECT_EQ(memory.vision.constant_velocity_s, 0);
+  EXPECT_FALSE(memory.monitor(LocalizationSensor::vision).test) << "there is no prediction to test against";
 }
 
 // σ of the motion 30 µm, of the prediction 1 mm.
@@ -52,7 +53,10 @@ TEST(MotionUpdate, WithAnImuThePredictionIsCorrected) {
   MotionUpdate(options).update(memory, forward(0.102));
   EXPECT_NEAR(travelled(memory), 0.102, 1e-5);
   EXPECT_NEAR(variance_at(memory, 0), 9e-10, 1e-10);
-  EXPECT_EQ(memory.monitor(LocalizationSensor::vision).state, SensorState::ok);
+  const SensorMonitor& monitor = memory.monitor(LocalizationSensor::vision);
+  EXPECT_EQ(monitor.state, SensorState::ok);
+  ASSERT_TRUE(monitor.test);
+  EXPECT_NEAR(monitor.test->nis, 4, 0.1) << "2 mm, of σ 1 mm";
 }
 
 TEST(MotionUpdate, AWildMotionIsDoubtedUntilTheNextOne) {
@@ -62,6 +66,8 @@ TEST(MotionUpdate, AWildMotionIsDoubtedUntilTheNextOne) {
   motions.update(memory, forward(0.6));
   EXPECT_TRUE(memory.vision.doubted);
   EXPECT_NEAR(travelled(memory), 0.1, 1e-9);
+  ASSERT_TRUE(memory.monitor(LocalizationSensor::vision).test);
+  EXPECT_GT(memory.monitor(LocalizationSensor::vision).test->nis, 1e5) << "0.5 m, of σ 1 mm";
   // The next one is contradicted, too: both were right.
   memory.stamp = after_start(2);
   memory.estimate.covariance.diagonal().head<3>().array() += 1e-6;
@@ -72,6 +78,11 @@ TEST(MotionUpdate, AWildMotionIsDoubtedUntilTheNextOne) {
   EXPECT_FALSE(memory.vision.doubted);
   EXPECT_NEAR(travelled(memory), 1.2, 0.02);
   EXPECT_EQ(memory.monitor(LocalizationSensor::imu).state, SensorState::suspect);
+  // It is used, and the IMU is what failed: its innovation is as it was measured, against the prediction by the IMU.
+  for (const LocalizationSensor sensor : {LocalizationSensor::vision, LocalizationSensor::imu}) {
+    ASSERT_TRUE(memory.monitor(sensor).test);
+    EXPECT_GT(memory.monitor(sensor).test->nis, memory.monitor(sensor).test->gate) << name_of(sensor);
+  }
 }
 
 TEST(MotionUpdate, ALostFrameKeepsItsReference) {

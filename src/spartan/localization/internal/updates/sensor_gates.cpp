@@ -6,6 +6,14 @@
 #include "spartan/localization/internal/chi_square.h"
 
 namespace spartan::internal {
+namespace {
+
+// Infinite or no number where the covariance of the innovation is singular.
+double finite(double nis) {
+  return std::isfinite(nis) ? nis : std::numeric_limits<double>::max();
+}
+
+}  // namespace
 
 SensorGates::SensorGates(const LocalizationOptions& options)
     : excluded_after_(options.health.excluded_after), readmit_after_(options.health.readmit_after) {
@@ -22,16 +30,20 @@ bool SensorGates::accept(FilterMemory& memory, LocalizationSensor sensor, double
 bool SensorGates::accept_within(FilterMemory& memory, LocalizationSensor sensor, double nis, double limit,
                                 HealthReason why) const {
   SensorMonitor& monitor = memory.monitor(sensor);
-  // Infinite or no number where the covariance of the innovation is singular.
-  const double finite = std::isfinite(nis) ? nis : std::numeric_limits<double>::max();
-  monitor.test = InnovationTest{memory.stamp, finite, limit};
-  return monitor.accept(finite, limit, why, excluded_after_, readmit_after_);
+  monitor.test = InnovationTest{memory.stamp, finite(nis), limit};
+  return count(monitor, nis, limit, why);
 }
 
-bool SensorGates::accept_untested(FilterMemory& memory, LocalizationSensor sensor) const {
-  SensorMonitor& monitor = memory.monitor(sensor);
+bool SensorGates::accept_motion(FilterMemory& memory, const MotionDecision& decision,
+                                std::optional<double> tested) const {
+  SensorMonitor& monitor = memory.monitor(LocalizationSensor::vision);
   monitor.test.reset();
-  return monitor.accept(0, 0, HealthReason::none, excluded_after_, readmit_after_);
+  if (tested) monitor.test = InnovationTest{memory.stamp, finite(*tested), limits_.vision};
+  return count(monitor, decision.nis, decision.gate, decision.why);
+}
+
+bool SensorGates::count(SensorMonitor& monitor, double nis, double limit, HealthReason why) const {
+  return monitor.accept(finite(nis), limit, why, excluded_after_, readmit_after_);
 }
 
 }  // namespace spartan::internal

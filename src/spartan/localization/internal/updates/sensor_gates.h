@@ -1,6 +1,8 @@
 // Chi-square tests of the innovations of all sensors.
 #pragma once
 
+#include <optional>
+
 #include "spartan/localization/internal/filter_memory.h"
 #include "spartan/localization/internal/updates/motion_decision.h"
 #include "spartan/localization/localization_options.h"
@@ -17,13 +19,15 @@ class SensorGates {
   bool accept(FilterMemory& memory, LocalizationSensor sensor, double nis, int rows, HealthReason why) const;
   /// The same with a limit of the caller's.
   bool accept_within(FilterMemory& memory, LocalizationSensor sensor, double nis, double limit, HealthReason why) const;
-  /// The same for a measurement that there is no prediction to test against.
-  bool accept_untested(FilterMemory& memory, LocalizationSensor sensor) const;
+  /// The same for visual motions, whose decision (motion_decision.h) is not always that of a test: `tested` is the
+  /// normalized innovation squared against the prediction by the IMU, none without one.
+  bool accept_motion(FilterMemory& memory, const MotionDecision& decision, std::optional<double> tested) const;
 
   const MotionGates& limits() const { return limits_; }
   double limit(int rows) const { return limits_.by_rows[static_cast<std::size_t>(rows)]; }
 
  private:
+  bool count(SensorMonitor& monitor, double nis, double limit, HealthReason why) const;
   MotionGates limits_;
   int excluded_after_, readmit_after_;
 };

@@ -57,8 +57,14 @@ TEST(SensorGates, TheLastTestIsKept) {
     EXPECT_EQ(monitor.test->nis, std::numeric_limits<double>::max());
     EXPECT_EQ(monitor.nis, std::numeric_limits<double>::max());
   }
-  EXPECT_TRUE(gates.accept_untested(memory, LocalizationSensor::vision));
-  EXPECT_FALSE(memory.monitor(LocalizationSensor::vision).test);
+  const SensorMonitor& vision = memory.monitor(LocalizationSensor::vision);
+  const MotionDecision reset{MotionUse::reset, false, false, 0, 30, HealthReason::none};  // the IMU has failed
+  EXPECT_TRUE(gates.accept_motion(memory, reset, 50));
+  ASSERT_TRUE(vision.test);
+  EXPECT_EQ(vision.test->nis, 50);
+  EXPECT_EQ(vision.test->gate, gates.limits().vision);
+  EXPECT_TRUE(gates.accept_motion(memory, {MotionUse::follow, false, false, 0, 30, HealthReason::none}, {}));
+  EXPECT_FALSE(vision.test);
 }
 
 }  // namespace
