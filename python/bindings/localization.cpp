@@ -29,10 +29,12 @@ nb::dict health_of(const LocalizationEstimate& e) {
 }
 
 void bind_estimate(nb::module_& m) {
-  nb::class_<InnovationTest>(m, "InnovationTest",
-                             "Chi-square test of an innovation: the measurement may be used where `nis` is at most `gate`.")
+  nb::class_<InnovationTest>(
+      m, "InnovationTest",
+      "Chi-square test of an innovation: the measurement may be used where `nis` is at most `gate`.")
       .def_prop_ro("stamp_ns", [](const InnovationTest& t) { return t.stamp.ns; })
-      .def_ro("nis", &InnovationTest::nis, "Normalized innovation squared, rᵀ S⁻¹ r; the largest float where S is singular.")
+      .def_ro("nis", &InnovationTest::nis,
+              "Normalized innovation squared, rᵀ S⁻¹ r; the largest float where S is singular.")
       .def_ro("gate", &InnovationTest::gate)
       .def("__repr__", [](const InnovationTest& t) { return fmt::format("<NIS {:.3g}, gate {:.3g}>", t.nis, t.gate); });
   nb::class_<SensorHealth>(m, "SensorHealth", "Whether a sensor is used, and why not.")
@@ -42,9 +44,10 @@ void bind_estimate(nb::module_& m) {
       .def_ro("reason", &SensorHealth::reason)
       .def_ro("used", &SensorHealth::used, "Samples used by the filter.")
       .def_ro("rejected", &SensorHealth::rejected, "Samples rejected by the filter.")
-      .def_ro("test", &SensorHealth::test,
-              "The last test of an innovation. Of vision: against the prediction by the IMU; None where there is no such "
-              "prediction.")
+      .def_ro(
+          "test", &SensorHealth::test,
+          "The last test of an innovation. Of vision: against the prediction by the IMU; None where there is no such "
+          "prediction.")
       .def("__repr__", [](const SensorHealth& h) {
         return fmt::format("<{}{}{}>", name_of(h.state), h.reason.empty() ? "" : ": ", h.reason);
       });

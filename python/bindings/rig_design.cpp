@@ -31,10 +31,13 @@ nb::dict design(const PathText& requirements, bool whole_set) {
 }  // namespace
 
 void bind_rig_design(nb::module_& m) {
-  m.def("design_rig", design, "requirements"_a, nb::kw_only(), "whole_set"_a = false,
-        nb::sig("def design_rig(requirements: str | os.PathLike[str], *, whole_set: bool = False) -> dict[str, typing.Any]"),
-        "Searches the stereo pairs that meet a rover's requirements (docs/reference/requirements.md). Returns what `spartan "
-        "rig design --json` prints (docs/reference/json.md); `whole_set`: also every feasible combination of each pair.");
+  m.def(
+      "design_rig", design, "requirements"_a, nb::kw_only(), "whole_set"_a = false,
+      nb::sig(
+          "def design_rig(requirements: str | os.PathLike[str], *, whole_set: bool = False) -> dict[str, typing.Any]"),
+      "Searches the stereo pairs that meet a rover's requirements (docs/reference/requirements.md). Returns what "
+      "`spartan "
+      "rig design --json` prints (docs/reference/json.md); `whole_set`: also every feasible combination of each pair.");
 }
 
 }  // namespace spartan::python

@@ -215,7 +215,8 @@ void add_rig_convert(CLI::App& rig, Context& context) {
   command->add_option("--pair", a->pair, "Convert only this pair of the rig (default: all).");
   command
       ->add_option("--size-px", a->size_px,
-                   "Image size W,H in pixels, for formats that do not hold it or hold several (default: that of the calibration).")
+                   "Image size W,H in pixels, for formats that do not hold it or hold several (default: that of the "
+                   "calibration).")
       ->delimiter(',')
       ->expected(2)
       ->check(CLI::Range(1, 32767));

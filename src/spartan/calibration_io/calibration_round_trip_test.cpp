@@ -241,9 +241,9 @@ RC_GTEST_PROP(CalibrationRoundTrip, ChainsLoseNothing, ()) {
   const bool held = std::any_of(b.models.begin(), b.models.end(), [&](const char* m) { return kind == m; });
   const bool by_body = a.body && b.body, by_left = a.left_camera && b.left_camera;
   RC_PRE(held && (by_body || by_left));
-  const Rig rig = any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()),
-                          is_rectified(a.format) || is_rectified(b.format), a.sizes && b.sizes,
-                          a.only.empty() ? b.only : a.only);
+  const Rig rig =
+      any_rig(kind, by_body && (!by_left || *rc::gen::arbitrary<bool>()),
+              is_rectified(a.format) || is_rectified(b.format), a.sizes && b.sizes, a.only.empty() ? b.only : a.only);
   RC_PRE(rig.validation_errors().empty());
   const TemporaryFolder first, second, third;
   const auto of_a = round_trip(rig, a, first);

@@ -125,8 +125,8 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
     case HealthReason::none:
       break;
     case HealthReason::disagrees:
-      health.reason =
-          fmt::format("disagrees with the other sensors: NIS {} above the chi-square gate of {:.1f}", text_of(nis), limit);
+      health.reason = fmt::format("disagrees with the other sensors: NIS {} above the chi-square gate of {:.1f}",
+                                  text_of(nis), limit);
       break;
     case HealthReason::slips:
       health.reason = fmt::format("the wheels slip: NIS {} above the chi-square gate of {:.1f}", text_of(nis), limit);
@@ -148,8 +148,8 @@ SensorHealth SensorMonitor::report(Stamp now, double timeout_s, const RefusalCou
       health.reason = "its motion contradicts the IMU or the wheels by far";
       break;
     case HealthReason::outvoted:
-      health.reason = fmt::format(
-          "contradicts the IMU and the wheels, which agree: NIS {} above the gate of {:.1f}", text_of(nis), limit);
+      health.reason = fmt::format("contradicts the IMU and the wheels, which agree: NIS {} above the gate of {:.1f}",
+                                  text_of(nis), limit);
       break;
     case HealthReason::implausible:
       health.reason = "its motion is far off what those before it predict, and no other sensor confirms it";

@@ -69,7 +69,11 @@ void fill_up(Json& table, std::size_t frames) {
 }  // namespace
 
 std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t from) {
-  Json columns{{"from", from}, {"total", frames.size()}, {"stages", Json::object()}, {"sensors", Json::object()}, {"innovations", Json::object()}};
+  Json columns{{"from", from},
+               {"total", frames.size()},
+               {"stages", Json::object()},
+               {"sensors", Json::object()},
+               {"innovations", Json::object()}};
   for (const char* name : {"t_s", "stamp_ns", "status", "message", "inliers", "matches", "landmarks", "rms_px", "pose",
                            "sigma_m", "ellipse_m2", "latency_ms", "odometry", "slam", "localization", "smoothed"})
     columns[name] = Json::array();

@@ -43,7 +43,8 @@ Result<std::string> make_report(ReportRequest request);
 ///   t_s since the first frame, stamp_ns (text), status, message; inliers, matches, landmarks, rms_px; latency_ms;
 ///   pose [x, y, z, qx, qy, qz, qw] of the best trajectory, sigma_m (along x, y, z of the world), ellipse_m2
 ///   (covariance xx, xy, yy of the position); odometry, slam, localization, smoothed: [x, y, z]; stages: {name: [ms]};
-///   sensors: {name: [state]}; innovations: {name: [normalized innovation squared over its gate]}: above 1 the measurement contradicts its prediction.
+///   sensors: {name: [state]}; innovations: {name: [normalized innovation squared over its gate]}: above 1 the
+///   measurement contradicts its prediction.
 std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t from);
 
 /// The global map as a few arrays, for drawing in a browser: a JSON header with the layers and their places, padded to

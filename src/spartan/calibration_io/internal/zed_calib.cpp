@@ -1,9 +1,8 @@
-// SN….conf of ZED cameras: sections LEFT_CAM_HD, RIGHT_CAM_HD of each resolution, LEFT_DISTO, RIGHT_DISTO and STEREO, in
-// millimetres and radians.
-// Source: the programs of Stereolabs that write and read it (zed-opencv-calibration: StereoCalib, saveCalibZED).
-// x_right = R x_left + T with R by the rotation vector (RX, CV, RZ) and T = (−Baseline, TY, TZ), in optical axes. The
-// sample of zed-open-capture takes T = (Baseline, TY, TZ), which turns the sign of TY and TZ, some tenths of a
-// millimetre, against the baseline.
+// SN….conf of ZED cameras: sections LEFT_CAM_HD, RIGHT_CAM_HD of each resolution, LEFT_DISTO, RIGHT_DISTO and STEREO,
+// in millimetres and radians. Source: the programs of Stereolabs that write and read it (zed-opencv-calibration:
+// StereoCalib, saveCalibZED). x_right = R x_left + T with R by the rotation vector (RX, CV, RZ) and T = (−Baseline, TY,
+// TZ), in optical axes. The sample of zed-open-capture takes T = (Baseline, TY, TZ), which turns the sign of TY and TZ,
+// some tenths of a millimetre, against the baseline.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -287,8 +286,8 @@ Result<CalibrationFiles> internal::write_zed_calib(const Rig& rig, const std::st
     return cannot_hold(right, "zed holds a right camera to the right of the left one, within 10 m and 1 rad, only");
   const std::string name = upper_case(resolution->name);
   const std::string stereo =
-      fmt::format("[STEREO]\nBaseline={}\nTY={}\nTZ={}\nCV_{name}={}\nRX_{name}={}\nRZ_{name}={}\n", -t.x(), t.y(), t.z(),
-                  r.y(), r.x(), r.z(), fmt::arg("name", name));
+      fmt::format("[STEREO]\nBaseline={}\nTY={}\nTZ={}\nCV_{name}={}\nRX_{name}={}\nRZ_{name}={}\n", -t.x(), t.y(),
+                  t.z(), r.y(), r.x(), r.z(), fmt::arg("name", name));
   return CalibrationFiles{
       {path, camera_text("LEFT", name, *left_held) + camera_text("RIGHT", name, *right_held) + stereo}};
 }

@@ -19,7 +19,8 @@ using testing::replaced;
 using testing::TemporaryFolder;
 
 const std::string kCameras =
-    "[LEFT_CAM_FHD]\nfx=1400.5\nfy=1400.25\ncx=961.5\ncy=530.75\nk1=-0.17\nk2=0.026\np1=0.0001\np2=-0.0002\nk3=1e-05\n\n"
+    "[LEFT_CAM_FHD]\nfx=1400.5\nfy=1400.25\ncx=961.5\ncy=530.75\nk1=-0.17\nk2=0.026\np1=0.0001\np2=-0.0002\nk3=1e-"
+    "05\n\n"
     "[RIGHT_CAM_FHD]\nfx=1402\nfy=1401\ncx=950\ncy=541\nk1=-0.171\nk2=0.027\np1=0\np2=0\nk3=0\n\n"
     "[LEFT_CAM_HD]\nfx=700.25\nfy=700.125\ncx=641.25\ncy=344\nk1=-0.17\nk2=0.026\n\n"
     "[RIGHT_CAM_HD]\nfx=701\nfy=700.5\ncx=633\ncy=359\nk1=-0.171\nk2=0.027\n\n";
@@ -41,8 +42,8 @@ TEST_F(ZedCalib, CamerasAreThoseOfTheImageSize) {
   ASSERT_TRUE(full) << full.error().message();
   ASSERT_TRUE(half) << half.error().message();
   EXPECT_EQ(full->format, CalibrationFormat::zed);
-  EXPECT_EQ(full->rig.cameras[0].model,
-            CameraModel(RadialTangentialModel({1400.5, 1400.25, 961.5, 530.75}, {-0.17, 0.026, 0.0001, -0.0002, 1e-5})));
+  EXPECT_EQ(full->rig.cameras[0].model, CameraModel(RadialTangentialModel({1400.5, 1400.25, 961.5, 530.75},
+                                                                          {-0.17, 0.026, 0.0001, -0.0002, 1e-5})));
   EXPECT_EQ(half->rig.cameras[1].model, CameraModel(RadialTangentialModel({701, 700.5, 633, 359}, {-0.171, 0.027})));
   EXPECT_EQ(half->rig.cameras[1].size, ImageSize(1280, 720));
 }
@@ -67,19 +68,21 @@ TEST_F(ZedCalib, OldFilesHaveNoOffsetsAndNewOnesThoseOfAResolution) {
   };
   const std::string old = replaced(replaced(kZed, "TY=1.25\n", ""), "TZ=-2.5\n", "");
   EXPECT_LE((right_at(old) - Eigen::Vector3d(-0.1195, 0, 0)).norm(), 1e-15);
-  EXPECT_LE((right_at(replaced(kZed, "TY=1.25\n", "TY=1.25\nTY_HD=1.5\n")) - Eigen::Vector3d(-0.1195, 0.0015, -0.0025)).norm(), 1e-15);
+  EXPECT_LE((right_at(replaced(kZed, "TY=1.25\n", "TY=1.25\nTY_HD=1.5\n")) - Eigen::Vector3d(-0.1195, 0.0015, -0.0025))
+                .norm(),
+            1e-15);
 }
 
 TEST_F(ZedCalib, SectionsOfDistortionHoldForAllResolutions) {
-  const std::string rational = kZed + "\n [LEFT_DISTO]\nk1 = 1\nk2 = 2\np1 = 3\np2 = 4\nk3 = 5\nk4 = 6\nk5 = 7\nk6 = 8\n";
+  const std::string rational =
+      kZed + "\n [LEFT_DISTO]\nk1 = 1\nk2 = 2\np1 = 3\np2 = 4\nk3 = 5\nk4 = 6\nk5 = 7\nk6 = 8\n";
   const auto read_rational = read(rational);
   ASSERT_TRUE(read_rational) << read_rational.error().message();
   EXPECT_EQ(read_rational->rig.cameras[0].model,
             CameraModel(RadialTangentialModel({700.25, 700.125, 641.25, 344}, {1, 2, 3, 4, 5, 6, 7, 8})));
   EXPECT_EQ(read_rational->rig.cameras[1].model,
             CameraModel(RadialTangentialModel({701, 700.5, 633, 359}, {-0.171, 0.027})));
-  const std::string fisheye =
-      kZed + "\n[LEFT_DISTO]\nk1=0.1\nk2=0.2\nk3=0.03\nk4=0.04\nk5=0\nk6=0\np1=0\np2=0\n";
+  const std::string fisheye = kZed + "\n[LEFT_DISTO]\nk1=0.1\nk2=0.2\nk3=0.03\nk4=0.04\nk5=0\nk6=0\np1=0\np2=0\n";
   EXPECT_EQ(read(fisheye).value().rig.cameras[0].model,
             CameraModel(EquidistantModel({700.25, 700.125, 641.25, 344}, {0.1, 0.2, 0.03, 0.04})));
 }
@@ -116,8 +119,10 @@ TEST_F(ZedCalib, ErrorsAreSpecific) {
   EXPECT_THAT(error_message(read(kZed, {640, 480})), HasSubstr("has no cameras of 640x480 pixels, but of 1920x1080, "));
   EXPECT_THAT(error_message(read(kCameras)), HasSubstr("the section [STEREO] is missing"));
   EXPECT_THAT(message_for("[RIGHT_CAM_HD]", "[RIGHT_CAM_VGA]"), HasSubstr("the section [RIGHT_CAM_HD] is missing"));
-  EXPECT_THAT(message_for("[MISC]", "[left_cam_hd]"), HasSubstr("SN8452.conf:50: the section [LEFT_CAM_HD] is there twice"));
-  EXPECT_THAT(message_for("Baseline=119.5", "Baseline=0.1195"), HasSubstr("SN8452.conf:40: baseline: must be in milli"));
+  EXPECT_THAT(message_for("[MISC]", "[left_cam_hd]"),
+              HasSubstr("SN8452.conf:50: the section [LEFT_CAM_HD] is there twice"));
+  EXPECT_THAT(message_for("Baseline=119.5", "Baseline=0.1195"),
+              HasSubstr("SN8452.conf:40: baseline: must be in milli"));
   EXPECT_THAT(message_for("TZ=-2.5", "TZ=-25000"), HasSubstr("SN8452.conf:42: tz: must be in millimetres"));
   EXPECT_THAT(message_for("RX_HD=-0.004", "RX_HD=1.2"), HasSubstr("rx_hd: with CV and RZ must be a rotation vector"));
   EXPECT_THAT(message_for("RX_HD", "RX_VGA"), HasSubstr("the line 'rx_hd=' is missing"));

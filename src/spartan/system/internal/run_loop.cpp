@@ -242,8 +242,7 @@ Status RunLoop::process_frame(const StereoFrame& frame, std::string_view fault) 
   }
   FrameResult& output = **result;
   std::optional<double> latency_ms;
-  if (!recording_ && !catching_up_)
-    latency_ms = latencies_.add(arrived_, std::chrono::steady_clock::now(), at_stop);
+  if (!recording_ && !catching_up_) latency_ms = latencies_.add(arrived_, std::chrono::steady_clock::now(), at_stop);
   ++usable_frames_;
   RunResult recorded;
   FrameRecord& record = recorded.step.frame.emplace();
