@@ -312,7 +312,7 @@ RC_GTEST_PROP(CalibrationRoundTrip, DroppedPropertiesAreReported, ()) {
   const FormatCase format_case = kFormatCases[*rc::gen::inRange<std::size_t>(1, kFormatCases.size())];
   const std::string kind = *rc::gen::elementOf(format_case.models);
   const bool rectified = is_rectified(format_case.format);
-  const Rig plain = any_rig(kind, true, rectified, format_case.sizes);
+  const Rig plain = any_rig(kind, true, rectified, format_case.sizes, format_case.only);
   Rig rig = plain;
   put_on_mast(rig);
   RC_PRE(rig.validation_errors().empty());

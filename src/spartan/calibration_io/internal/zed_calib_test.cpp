@@ -126,7 +126,7 @@ TEST_F(ZedCalib, ErrorsAreSpecific) {
   EXPECT_THAT(message_for("TZ=-2.5", "TZ=-25000"), HasSubstr("SN8452.conf:42: tz: must be in millimetres"));
   EXPECT_THAT(message_for("RX_HD=-0.004", "RX_HD=1.2"), HasSubstr("rx_hd: with CV and RZ must be a rotation vector"));
   EXPECT_THAT(message_for("RX_HD", "RX_VGA"), HasSubstr("the line 'rx_hd=' is missing"));
-  EXPECT_THAT(message_for("RX_HD", "RX_FHD"), HasSubstr("rx_fhd"));
+  EXPECT_THAT(message_for("CV_HD", "RX_HD"), HasSubstr("more than once"));
   EXPECT_THAT(message_for("fx=700.25", "fx=-1"), HasSubstr("SN8452.conf:24: fx: the focal length must be above zero"));
   EXPECT_THAT(message_for("fx=700.25", "fx=nan"), HasSubstr("SN8452.conf:24"));
   EXPECT_THAT(message_for("fx=700.25", "fx=1e300"), HasSubstr("SN8452.conf"));
