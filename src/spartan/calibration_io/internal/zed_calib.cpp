@@ -157,9 +157,9 @@ Result<Camera> read_zed_camera(const ZedSections& sections, const std::string& p
 
 // TY and TZ of one resolution or of all; 0 where the file has none.
 Result<double> read_offset_mm(const TextMatrices& stereo, const std::string& key, const std::string& resolution) {
-  for (const std::string& name : {key + "_" + resolution, key}) {
+  for (const std::string& name : {fmt::format("{}_{}", key, resolution), key}) {
     if (!stereo.has(name)) continue;
-    const auto value = number(stereo, name);
+    auto value = number(stereo, name);
     if (value && std::abs(*value) > kFarthest_mm) return stereo.error_at(name, "must be in millimetres");
     return value;
   }
@@ -201,6 +201,7 @@ Result<ZedResolution> choose_resolution(const ZedSections& sections, const std::
     if (resolution.size == size || (size.empty() && there.size() == 1)) return resolution;
   }
   std::vector<std::string> sizes;
+  sizes.reserve(there.size());
   for (const ZedResolution& resolution : there) sizes.push_back(text_of(resolution.size));
   if (!size.empty()) {
     return failure(ErrorCode::configuration,
