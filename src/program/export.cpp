@@ -55,9 +55,8 @@ Result<ExitCode> export_command(const Context& context, const ExportArguments& a
   if (*format == ExportFormat::colmap && !arguments.recording.empty())
     return export_images(context, arguments, kind, workers);
   for (const CLI::Option* option : arguments.of_recording) {
-    if (option->count() > 0)
-      return failure(ErrorCode::usage, "is of --format colmap with --recording only", option->get_name(),
-                     "leave it out");
+    if (option->count() == 0) continue;
+    return failure(ErrorCode::usage, "is of --format colmap with --recording only", option->get_name(), "leave it out");
   }
   if (Status s = expect_new_file(context, arguments.output); !s) return failure(s);
   if (Status s = export_run(arguments.run, *format, kind, workers, arguments.output); !s) return failure(s);
