@@ -268,17 +268,13 @@ def check_in_browser(program, run, recording, screenshots):
                         take_screenshot(page, screenshots / f"view_{width}_{scheme}.png", width)
         check(not browser.told, f"the console tells nothing: {browser.told}")
         with browser.page(1600) as page:
-            turning = page.evaluate("() => spartan.scene.measure(60)")
-            times = sorted(turning[20:])
-            ratio = page.evaluate("() => spartan.scene.state().pixelRatio")
-            check(ratio < 1 or sorted(turning[:10])[5] < 70, f"frames of {turning[:10]} ms are drawn with all pixels")
-            page.wait_for_function("() => spartan.scene.state().pixelRatio === window.devicePixelRatio", timeout=20000)
+            times = sorted(page.evaluate("() => spartan.scene.measure(60)"))
             show = page.evaluate("""() => { const begin = performance.now(), n = spartan.state().total;
               for (let i = 0; i < 20; ++i) { const t = document.getElementById('time'); t.value = Math.floor(i * n / 20); t.dispatchEvent(new Event('input')); }
               return (performance.now() - begin) / 20; }""")
             state = page.evaluate("() => [spartan.state().total, spartan.scene.state().vertices]")
-            print(f"{state[0]} frames, {state[1]} vertices: turning the scene {times[20]:.1f} ms a frame (median, rendered without "
-                  f"a graphics card, {ratio:.2f} of the pixels' sides while it turns), {show:.1f} ms of script for a step of the slider")
+            print(f"{state[0]} frames, {state[1]} vertices: turning the scene {sum(times) / 60:.1f} ms a frame (mean, rendered without "
+                  f"a graphics card), {show:.1f} ms of script for a step of the slider")
 
 
 def check_live(program, drive, folder):

@@ -95,26 +95,49 @@
     }
   };
 
-  // Coordinates of a line of at most some 1500 points: those that are nearer to the one before than a share of its length are
-  // left out.
+  const between = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+  // Distance of p from the segment from a to b.
+  const off = (p, a, b) => {
+    const length = between(a, b), part = length > 0
+      ? [0, 1, 2].reduce((sum, i) => sum + (p[i] - a[i]) * (b[i] - a[i]), 0) / (length * length) : 0;
+    const t = Math.min(Math.max(part, 0), 1);
+    return between(p, [0, 1, 2].map(i => a[i] + t * (b[i] - a[i])));
+  };
+  // Points of a line that is nowhere farther than `tolerance` from the given one (Douglas and Peucker, 1973).
+  const simplified = (points, tolerance) => {
+    const keep = new Uint8Array(points.length), spans = [[0, points.length - 1]];
+    keep[0] = keep[points.length - 1] = 1;
+    while (spans.length > 0) {
+      const [first, last] = spans.pop();
+      let farthest = -1, most = tolerance;
+      for (let i = first + 1; i < last; ++i) {
+        const distance = off(points[i], points[first], points[last]);
+        if (distance > most) [farthest, most] = [i, distance];
+      }
+      if (farthest < 0) continue;
+      keep[farthest] = 1;
+      spans.push([first, farthest], [farthest, last]);
+    }
+    return points.filter((_, i) => keep[i]);
+  };
+  // Coordinates of a line of few points: the time to draw wide lines is that of their segments. First of at most some 1500,
+  // without those that are nearer to the one before than a share of its length.
   const thinned = positions => {
     const known = positions.filter(p => p), points = [];
-    const between = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
     let length = 0;
     for (let i = 1; i < known.length; ++i) length += between(known[i - 1], known[i]);
     let last = null;
     known.forEach((p, i) => {
       if (last && i + 1 < known.length && between(last, p) < length / 1500) return;
-      points.push(p[0], p[1], p[2] + 0.02);
+      points.push(p);
       last = p;
     });
-    return points;
+    return points.length === 0 ? [] : simplified(points, Math.max(0.002, 2e-5 * length)).flatMap(p => [p[0], p[1], p[2] + 0.02]);
   };
 
   window.makeScene = element => {
     const renderer = new THREE.WebGLRenderer({antialias: true, alpha: true, preserveDrawingBuffer: true});
-    const fullRatio = Math.min(window.devicePixelRatio, 2);
-    renderer.setPixelRatio(fullRatio);
+    renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     element.append(renderer.domElement);
     const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(45, 1, 0.05, 5000);
     camera.up.set(0, 0, 1);
@@ -128,63 +151,29 @@
     const marker = rover(), lines = {}, limits = {};
     scene.add(marker);
     let terrain = null, map = null, layer = 'colour', framed = false, mapFramed = false, following = false, asked = false, frames = null, now = 0;
-    let drawn = 0, stepped = 0, moving = false, movingRatio = fullRatio, rest = null;
+    let drawn = 0;
 
-    // Without a graphics card the time of a frame is that of its pixels: while the view moves there are fewer of them,
-    // as many as make frames of about kFrame_ms, and all of them again when it rests.
-    const kFrame_ms = 33, kSlow_ms = 50, kLeastRatio = 0.25, kRest_ms = 400;
-    let shortest_ms = 1000;  // the interval of the display
-    const setRatio = ratio => {
-      if (renderer.getPixelRatio() !== ratio) renderer.setPixelRatio(ratio);
-    };
-    const adapt = frame_ms => {
-      if (document.hidden) return;
-      shortest_ms = Math.min(shortest_ms, Math.max(frame_ms, 4));
-      const factor = frame_ms > kSlow_ms ? Math.max(Math.sqrt(kFrame_ms / frame_ms), 0.6) : frame_ms < 1.5 * shortest_ms ? 1.1 : 1;
-      movingRatio = Math.min(Math.max(factor * movingRatio, Math.min(kLeastRatio, fullRatio)), fullRatio);
-    };
-    const stopMoving = () => {
-      if (asked) {
-        rest = setTimeout(stopMoving, kRest_ms);
-        return;
-      }
-      moving = false;
-      ask();
-    };
     const draw = () => {
       asked = false;
-      setRatio(moving ? movingRatio : fullRatio);
-      const begin = performance.now();
       renderer.render(scene, camera);
       ++drawn;
-      if (!moving) return;
-      clearTimeout(rest);
-      requestAnimationFrame(() => {
-        adapt(performance.now() - begin);
-        clearTimeout(rest);
-        rest = setTimeout(stopMoving, kRest_ms);
-      });
     };
     const ask = () => {
       if (!asked) requestAnimationFrame(draw);
       asked = true;
     };
-    const move = () => {
-      moving = true;
-      ask();
-    };
     const resize = () => {
       const {clientWidth: width, clientHeight: height} = element;
       if (width === 0 || height === 0) return;
       renderer.setSize(width, height);
-      for (const line of Object.values(lines)) line.material.resolution.set(width, height);
+      for (const {material} of Object.values(lines)) if (material.resolution) material.resolution.set(width, height);
       camera.aspect = width / height;
       camera.updateProjectionMatrix();
       renderer.render(scene, camera);  // at once: the new size has cleared the canvas
       ++drawn;
     };
     new ResizeObserver(resize).observe(element);
-    controls.addEventListener('change', move);
+    controls.addEventListener('change', ask);
     element.addEventListener('pointerdown', () => element.focus());  // which OrbitControls prevents
     element.addEventListener('keydown', event => {
       const by = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
@@ -233,19 +222,28 @@
       ask();
       return span;
     };
-    // `points` of a line, or pairs of the ends of `segments`. Drawn over the terrain, whose cells may be a little higher.
-    const setLine = (name, points, colour, segments, width_px) => {
+    // Drawn over the terrain, whose cells may be a little higher.
+    const setLine = (name, line) => {
       if (lines[name]) {
         scene.remove(lines[name]);
         lines[name].geometry.dispose();
       }
-      const geometry = segments ? new THREE.LineSegmentsGeometry() : new THREE.LineGeometry();
+      line.renderOrder = 1;
+      lines[name] = line;
+      scene.add(line);
+    };
+    const wideLine = (points, colour) => {
+      const geometry = new THREE.LineGeometry();
       geometry.setPositions(points);
-      const material = new THREE.LineMaterial({color: new THREE.Color(colour), linewidth: width_px, depthTest: false, transparent: true});
+      const material = new THREE.LineMaterial({color: new THREE.Color(colour), linewidth: 2.5, depthTest: false, transparent: true});
       material.resolution.set(element.clientWidth, element.clientHeight);
-      lines[name] = new (segments ? THREE.LineSegments2 : THREE.Line2)(geometry, material);
-      lines[name].renderOrder = 1;
-      scene.add(lines[name]);
+      return new THREE.Line2(geometry, material);
+    };
+    // `ends`: of each segment.
+    const thinSegments = (ends, colour) => {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute('position', new THREE.Float32BufferAttribute(ends, 3));
+      return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({color: new THREE.Color(colour), depthTest: false, transparent: true}));
     };
 
     const api = {
@@ -271,14 +269,14 @@
         frames = columns;
         for (const [kind, colour] of Object.entries(kTrajectories)) {
           const points = thinned(columns[kind]);
-          if (points.length > 3) setLine(kind, points, css(colour), false, 2.5);
+          if (points.length > 3) setLine(kind, wideLine(points, css(colour)));
         }
         // At most 60 ellipses, evenly.
         const step = Math.max(1, Math.floor(columns.pose.length / 60)), points = [];
         for (let i = 0; i < columns.pose.length; i += step) {
           if (columns.pose[i]) ellipsePoints(columns.ellipse_m2[i], [columns.pose[i][0], columns.pose[i][1], columns.pose[i][2] + 0.02], points);
         }
-        if (points.length > 0) setLine('ellipses', points, css('--blue'), true, 1.2);
+        if (points.length > 0) setLine('ellipses', thinSegments(points, css('--blue')));
         if (!framed && !terrain && columns.pose.length > 1) {
           framed = true;  // once: then the camera is the user's, until there is a map
           frameAll(new THREE.Vector3(-0.7, -0.7, 0.8));
@@ -300,9 +298,7 @@
             controls.update();
           }
         }
-        const steps = performance.now() - stepped < kRest_ms;  // the slider is drawn, or it plays
-        stepped = performance.now();
-        if (steps) move(); else ask();
+        ask();
       },
       colourBy(name) {
         layer = name;
@@ -323,15 +319,15 @@
       repaint() {
         if (frames) api.setFrames(frames);
       },
-      // Of a test: turns the camera by so many frames, and returns the time of each in ms.
+      // Of a test: draws so many frames while the camera turns, and returns the time of each in ms.
       async measure(count) {
         const times = [];
         let last = performance.now();
         for (let i = 0; i < count; ++i) {
           const offset = camera.position.clone().sub(controls.target).applyAxisAngle(new THREE.Vector3(0, 0, 1), 0.02);
           camera.position.copy(controls.target).add(offset);
-          controls.update();                                           // asks for a frame
-          await new Promise(done => requestAnimationFrame(done));      // which is drawn before
+          controls.update();                                       // asks for a frame,
+          await new Promise(done => requestAnimationFrame(done));  // which is drawn before
           renderer.getContext().finish();
           times.push(performance.now() - last);
           last = performance.now();
@@ -353,7 +349,7 @@
         made.append(text(span[0]), bar, text(span[1]));
         box.append(made);
       },
-      state: () => ({drawn, pixelRatio: renderer.getPixelRatio(), vertices: terrain ? terrain.geometry.getAttribute('position').count : 0, time: now,
+      state: () => ({drawn, vertices: terrain ? terrain.geometry.getAttribute('position').count : 0, time: now,
         rover: marker.position.toArray(), lines: Object.keys(lines)}),
     };
     resize();
