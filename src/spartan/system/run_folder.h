@@ -111,7 +111,7 @@ Result<ExportFormat> parse_export_format(std::string_view name);
 Status export_run(const std::string& run_folder, ExportFormat format, std::optional<TrajectoryKind> kind,
                   const ThreadPool& workers, const std::string& path);
 
-/// Writes the folder of a COLMAP project: images/left/<stamp_ns>.png and images/right/<stamp_ns>.png, rectified, of
+/// Writes the folder of a COLMAP project: images/left/STAMP_NS.png and images/right/STAMP_NS.png, rectified, of
 /// each measured pose, and sparse/0 with cameras.txt (two PINHOLE cameras), images.txt (poses, camera from world) and
 /// points3D.txt (terrain points without tracks, at most 200 000). `recording`: the one that was run, with its images.
 /// Returns the number of images. Codes: `input` (no run, no such trajectory, a frame that the recording lacks),
