@@ -17,3 +17,4 @@ from spartan._run import Run as Run
 from spartan._run import run as run
 
 __version__: str = getattr(_core, "__version__")
+__all__ = [*(name for name in dir(_core) if not name.startswith("_")), "Error", "Run", "run"]

@@ -54,3 +54,10 @@ def test_everything_public_is_documented():
     missing = [name for name, each in vars(spartan).items()
                if not name.startswith("_") and callable(each) and not (each.__doc__ or "").strip()]
     assert missing == []
+
+
+def test_the_public_names_are_those_of_the_package():
+    """Reference and `from spartan import *` have what the extension defines and what is written in Python."""
+    names = set(spartan.__all__)
+    assert {"Imager", "Pose", "design_rig", "Error", "Run", "run"} <= names
+    assert all(hasattr(spartan, name) and not name.startswith("_") for name in names)
