@@ -36,25 +36,28 @@ GivenKeys changed_keys(const RunOptions& options) {
   return keys;
 }
 
-Result<std::unique_ptr<SampleStream>> open_stream(const std::string& address, const OpenOptions& open, double speed,
-                                                  int threads) {
+Result<std::unique_ptr<SampleStream>> open_stream(const std::string& address, const OpenOptions& open,
+                                                  const LiveOptions& live, int threads) {
   if (const auto scenario = program::scenario_of(address)) {
+    if (!live.sensors.empty())
+      return failure(ErrorCode::usage, "brings the samples of its sensors along", address, "omit sensors");
     auto plan = program::plan_simulation(*scenario, {}, {});
     if (!plan) return failure(plan);
-    return program::open_simulation(std::move(*plan), speed, ThreadPool(threads));
+    return program::open_simulation(std::move(*plan), live.speed, ThreadPool(threads));
   }
-  LiveOptions live;
-  live.speed = speed;
   return open_live_stream(address, open, live);
 }
 
 // Returns the summary.
-std::string run_input(const RunRequest& request, const RunHooks& hooks, double speed, PythonHooks& python) {
+std::string run_input(const RunRequest& request, const RunHooks& hooks, LiveOptions live, PythonHooks& python) {
   const nb::gil_scoped_release free;
   Result<RunOutcome> outcome;
   if (program::scenario_of(request.input) || is_live_address(request.input)) {
-    const auto stream = value_of(open_stream(request.input, request.open, speed, request.threads));
+    live.log = hooks.log;
+    const auto stream = value_of(open_stream(request.input, request.open, live, request.threads));
     outcome = run_live(*stream, request, hooks);
+  } else if (!live.sensors.empty()) {
+    outcome = failure(ErrorCode::usage, "is a recording, which has its sensors", request.input, "omit sensors");
   } else {
     outcome = run(request, hooks);
   }
@@ -71,7 +74,7 @@ int level_of(LogLevel level) {
 }
 
 std::string run_folder(const PathText& input, const PathText& output, const RunOptions* options,
-                       const OpenOptions& open, RunRequest request, double speed, const nb::object& progress,
+                       const OpenOptions& open, RunRequest request, const LiveOptions& live, const nb::object& progress,
                        const nb::object& frame, const nb::object& log) {
   request.input = input;
   request.output = output;
@@ -95,7 +98,7 @@ std::string run_folder(const PathText& input, const PathText& output, const RunO
   if (!frame.is_none()) {
     hooks.frame = [&](const FrameRecord& record) { python.call([&] { frame(record); }); };
   }
-  return run_input(request, hooks, speed, python);
+  return run_input(request, hooks, live, python);
 }
 
 void report(const PathText& run, const PathText& recording, const PathText& page, const std::optional<PathText>& truth,
@@ -130,7 +133,8 @@ void bind_runs(nb::module_& m) {
       [](const PathText& input, const PathText& output, const RunOptions* options, const std::optional<PathText>& rig,
          const std::optional<std::string>& format, const std::optional<std::string>& left,
          const std::optional<std::string>& right, double fps, std::optional<int> threads, int max_frames, bool resume,
-         bool replace, double speed, const nb::object& progress, const nb::object& frame, const nb::object& log) {
+         bool replace, double speed, int passes, const std::optional<PathText>& sensors, const nb::object& progress,
+         const nb::object& frame, const nb::object& log) {
         if (max_frames < 0) throw nb::value_error("max_frames: must not be negative");
         RunRequest request;
         request.threads = thread_count(threads);
@@ -138,13 +142,18 @@ void bind_runs(nb::module_& m) {
         request.resume = resume;
         request.replace = replace;
         request.record = true;  // of a live stream
-        return run_folder(input, output, options, open_options(rig, format, left, right, fps), request, speed, progress,
+        LiveOptions live;
+        live.speed = speed;
+        live.passes = passes;
+        if (sensors) live.sensors = *sensors;
+        return run_folder(input, output, options, open_options(rig, format, left, right, fps), request, live, progress,
                           frame, log);
       },
       "input"_a, "output"_a, "options"_a.none() = nb::none(), nb::kw_only(), "rig"_a = nb::none(),
       "format"_a = nb::none(), "left"_a = nb::none(), "right"_a = nb::none(), "fps"_a = 0.0, "threads"_a = nb::none(),
-      "max_frames"_a = 0, "resume"_a = false, "replace"_a = false, "speed"_a = 1.0, "progress"_a = nb::none(),
-      "frame"_a = nb::none(), "log"_a, "See spartan.run(). Returns the text of summary.json.");
+      "max_frames"_a = 0, "resume"_a = false, "replace"_a = false, "speed"_a = 1.0, "passes"_a = 1,
+      "sensors"_a = nb::none(), "progress"_a = nb::none(), "frame"_a = nb::none(), "log"_a,
+      "See spartan.run(). Returns the text of summary.json.");
   m.def("write_report", report, "run"_a, "recording"_a, "page"_a, "truth"_a = nb::none(), "threads"_a = nb::none(),
         "Writes the report page of a run folder.");
 }

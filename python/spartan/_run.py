@@ -114,6 +114,8 @@ def run(
     resume: bool = False,
     replace: bool = False,
     speed: float = 1,
+    passes: int = 1,
+    sensors: StrPath | None = None,
     truth: StrPath | None = None,
     report: bool = False,
     progress: Callable[[_core.RunProgress], object] | None = None,
@@ -127,6 +129,9 @@ def run(
     threads: None is all cores.
     max_frames: number of stereo frames to process; 0: all.
     speed: pace of a replay or a simulation.
+    passes: how often a replay plays its recording.
+    sensors: of cameras, a FIFO, created if there is none, whose lines are samples of the other sensors
+        (docs/tutorials/rover.md).
     truth: ground truth for the report, a trajectory file or a recording; None: that of the recording.
     report: also write the report page, `report/index.html`, of a recording.
     progress, frame: called after each frame. An exception that one raises ends the run; so does Ctrl-C. What was done
@@ -150,6 +155,8 @@ def run(
         resume=resume,
         replace=replace,
         speed=speed,
+        passes=passes,
+        sensors=sensors,
         progress=progress,
         frame=frame,
         log=logging.getLogger("spartan").log,

@@ -185,6 +185,19 @@ def test_a_replay_is_a_run(drive, tmp_path):
     assert len(run.frames) == 8 and run.summary["live"]["dropped"]["odometry"] == 0
 
 
+def test_a_replay_plays_twice(drive, tmp_path):
+    once = len(list((drive / "image_0").iterdir()))
+    run = spartan.run(f"replay:{drive}", tmp_path / "run", speed=20, passes=2)
+    assert len(run.frames) + run.summary["live"]["dropped"]["odometry"] == 2 * once
+
+
+@pytest.mark.parametrize("address", ["{}", "replay:{}", "sim:quick"])
+def test_only_cameras_have_sensors_beside_them(drive, tmp_path, address):
+    with pytest.raises(spartan.Error, match="sensors") as raised:
+        spartan.run(address.format(drive), tmp_path / "run", sensors=tmp_path / "fifo")
+    assert raised.value.code == "usage"
+
+
 def test_a_report_is_written(drive, tmp_path):
     run = spartan.run(drive, tmp_path / "run", max_frames=5, report=True)
     page = (run.path / "report" / "index.html").read_text(encoding="utf-8")
