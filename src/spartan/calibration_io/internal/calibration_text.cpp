@@ -54,6 +54,12 @@ std::string rows_of(const Eigen::Matrix3d& matrix, const char* separator) {
   return fmt::format("{}", fmt::join(rows.data(), rows.data() + rows.size(), separator));
 }
 
+std::string trimmed(const std::string& text) {
+  constexpr const char* kBlanks = " \t\r\v\f";
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
 std::vector<std::string> split_words(const std::string& text) {
   constexpr const char* kSpace = " \t\n\v\f\r";
   std::vector<std::string> words;

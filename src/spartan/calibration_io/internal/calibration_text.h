@@ -31,6 +31,8 @@ std::optional<Eigen::Quaterniond> rotation_of_vector(const Eigen::Vector3d& rota
 std::string list_of(const Eigen::Ref<const Eigen::VectorXd>& numbers, const char* separator = " ");
 std::string rows_of(const Eigen::Matrix3d& matrix, const char* separator = " ");
 
+/// Part of a line without the white space around it.
+std::string trimmed(const std::string& text);
 /// The words of a text, which are separated by white space. Not by a stream: in a stream, a failed allocation looks
 /// like the end of the text.
 std::vector<std::string> split_words(const std::string& text);

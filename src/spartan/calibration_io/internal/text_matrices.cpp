@@ -9,15 +9,6 @@
 #include "spartan/core/strict_yaml.h"
 
 namespace spartan::internal {
-namespace {
-
-std::string trimmed(const std::string& text) {
-  constexpr const char* kBlanks = " \t\r\v\f";
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
-}  // namespace
 
 Result<TextMatrices> TextMatrices::read(const std::string& path, char separator) {
   const auto text = read_calibration_text(path);

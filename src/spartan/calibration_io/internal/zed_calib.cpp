@@ -12,7 +12,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -61,11 +60,6 @@ std::string upper_case(std::string text) {
   return text;
 }
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
-  return first == std::string_view::npos ? std::string_view() : text.substr(first, last - first + 1);
-}
-
 using ZedSections = std::map<std::string, TextMatrices>;
 
 // The sections by their names, in lower case as their keys. Each is parsed behind as many empty lines as the file has
@@ -77,10 +71,10 @@ Result<ZedSections> sections_of(const std::string& path) {
   std::string name, above;  // `above`: as many ends of lines as there are lines above this one
   for (std::size_t begin = 0; begin < text->size(); above += '\n') {
     const std::size_t end = std::min(text->find('\n', begin), text->size());
-    const std::string line = lower_case(std::string(trimmed(std::string_view(*text).substr(begin, end - begin))));
+    const std::string line = lower_case(trimmed(text->substr(begin, end - begin)));
     begin = end + 1;
     if (line.starts_with('[') && line.ends_with(']')) {
-      name = trimmed(std::string_view(line).substr(1, line.size() - 2));
+      name = trimmed(line.substr(1, line.size() - 2));
       if (!lines.try_emplace(name, above + '\n').second) {
         return failure(ErrorCode::configuration, fmt::format("the section [{}] is there twice", upper_case(name)),
                        fmt::format("{}:{}", path, above.size() + 1));
