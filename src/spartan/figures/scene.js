@@ -8,6 +8,7 @@
   // Unknown, free, obstacle, cavity (Okabe & Ito).
   const kClasses = [[150, 150, 150], [120, 190, 165], [213, 94, 0], [0, 114, 178]];
   const kUnknown = [170, 165, 160];
+  const kSteps = [1, 2, 4, 8];  // cells between the vertices of the terrain's levels of detail
   const kTrajectories = {odometry: '--orange', slam: '--light-blue', localization: '--blue', smoothed: '--purple'};
 
   const ramp = value => {
@@ -46,7 +47,19 @@
     return map;
   };
 
-  // Two triangles between four known cells, one between three.
+  // Vertex numbers of the triangles over every `step`-th cell: two between four known cells, one between three.
+  const trianglesOf = ({width, height}, numbers, step) => {
+    const triangles = [], down = step * width;
+    for (let r = 0; r + step < height; r += step) {
+      for (let c = 0; c + step < width; c += step) {
+        const i = r * width + c, known = [i, i + down, i + down + step, i + step].map(k => numbers[k]).filter(n => n >= 0);
+        if (known.length >= 3) triangles.push(known[0], known[1], known[2]);
+        if (known.length === 4) triangles.push(known[0], known[2], known[3]);
+      }
+    }
+    return new THREE.Uint32BufferAttribute(triangles, 1);
+  };
+  // `levels`: indices of the same vertices, each of a quarter of the triangles of the one before.
   const terrainGeometry = map => {
     const {width, height, cell_m: cell} = map, numbers = new Int32Array(width * height).fill(-1), positions = [], cells = [];
     for (let i = 0; i < width * height; ++i) {
@@ -55,21 +68,14 @@
       cells.push(i);
       positions.push(map.west_m + (i % width + 0.5) * cell, map.north_m - (Math.floor(i / width) + 0.5) * cell, map.elevation_m[i]);
     }
-    const triangles = [];
-    for (let r = 0; r + 1 < height; ++r) {
-      for (let c = 0; c + 1 < width; ++c) {
-        const i = r * width + c, known = [i, i + width, i + width + 1, i + 1].map(k => numbers[k]).filter(n => n >= 0);
-        if (known.length >= 3) triangles.push(known[0], known[1], known[2]);
-        if (known.length === 4) triangles.push(known[0], known[2], known[3]);
-      }
-    }
+    const levels = kSteps.map(step => trianglesOf(map, numbers, step));
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute('position', new THREE.Float32BufferAttribute(positions, 3));
     geometry.setAttribute('color', new THREE.BufferAttribute(new Uint8Array(3 * cells.length), 3, true));
-    geometry.setIndex(new THREE.Uint32BufferAttribute(triangles, 1));
+    geometry.setIndex(levels[0]);
     geometry.computeVertexNormals();
     geometry.computeBoundingSphere();
-    return {geometry, cells: Int32Array.from(cells)};
+    return {geometry, cells: Int32Array.from(cells), levels};
   };
 
   const rover = () => {
@@ -153,10 +159,51 @@
     let terrain = null, map = null, layer = 'colour', framed = false, mapFramed = false, following = false, asked = false, frames = null, now = 0;
     let drawn = 0;
 
-    const draw = () => {
-      asked = false;
+    const useLevel = level => {
+      if (terrain) terrain.geometry.setIndex(terrain.userData.levels[level]);
+    };
+    // While the scene moves, the terrain gets coarser until a frame takes at most kFluid_ms, as long as that makes frames
+    // quicker: without a graphics card most of the time may be that of the browser. At rest it has all triangles.
+    const kFluid_ms = 40, kRest_ms = 500, kFrames = 6;
+    let level = 0, coarser = true, before = Infinity, times = [], lastDrawn = -Infinity, rest = null;
+    const chooseLevel = took => {
+      times.push(took);
+      if (times.length < kFrames) return;
+      const mean = times.slice(1).reduce((sum, ms) => sum + ms) / (kFrames - 1);  // the first is of the level before
+      times = [];
+      if (mean > 0.9 * before) {
+        [level, coarser, before] = [level - 1, false, Infinity];
+      } else if (coarser && mean > kFluid_ms && level + 1 < kSteps.length) {
+        [level, before] = [level + 1, mean];
+      } else {
+        before = Infinity;
+      }
+    };
+    const render = () => {
+      const distance = camera.position.distanceTo(controls.target);  // metres in a drive of a rover, kilometres in one of a car
+      camera.near = Math.max(0.05, distance / 500);
+      camera.far = 5000 + 100 * distance;
+      camera.updateProjectionMatrix();
+      marker.scale.setScalar(Math.max(1, distance / 40));  // visible from afar
       renderer.render(scene, camera);
       ++drawn;
+    };
+    const renderAtRest = () => {
+      lastDrawn = -Infinity;
+      [level, coarser, before, times] = [Math.max(level - 1, 0), true, Infinity, []];  // the next movement may be quicker
+      if (!terrain || terrain.geometry.index === terrain.userData.levels[0]) return;
+      useLevel(0);
+      render();
+    };
+    const draw = () => {
+      asked = false;
+      const time = performance.now(), moving = time - lastDrawn < kRest_ms;
+      if (moving) chooseLevel(time - lastDrawn);
+      lastDrawn = time;
+      useLevel(moving ? level : 0);
+      render();
+      clearTimeout(rest);
+      rest = setTimeout(renderAtRest, kRest_ms);
     };
     const ask = () => {
       if (!asked) requestAnimationFrame(draw);
@@ -168,9 +215,7 @@
       renderer.setSize(width, height);
       for (const {material} of Object.values(lines)) if (material.resolution) material.resolution.set(width, height);
       camera.aspect = width / height;
-      camera.updateProjectionMatrix();
-      renderer.render(scene, camera);  // at once: the new size has cleared the canvas
-      ++drawn;
+      render();  // at once: the new size has cleared the canvas
     };
     new ResizeObserver(resize).observe(element);
     controls.addEventListener('change', ask);
@@ -254,9 +299,9 @@
           terrain.geometry.dispose();
         }
         for (const name of Object.keys(limits)) delete limits[name];
-        const {geometry, cells} = terrainGeometry(map);
+        const {geometry, cells, levels} = terrainGeometry(map);
         terrain = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({vertexColors: THREE.VertexColors, side: THREE.DoubleSide}));
-        terrain.userData = {cells};
+        terrain.userData = {cells, levels};
         scene.add(terrain);
         const span = paint();
         if (!mapFramed) {
@@ -349,8 +394,8 @@
         made.append(text(span[0]), bar, text(span[1]));
         box.append(made);
       },
-      state: () => ({drawn, vertices: terrain ? terrain.geometry.getAttribute('position').count : 0, time: now,
-        rover: marker.position.toArray(), lines: Object.keys(lines)}),
+      state: () => ({drawn, vertices: terrain ? terrain.geometry.getAttribute('position').count : 0,
+        triangles: terrain ? terrain.geometry.index.count / 3 : 0, time: now, rover: marker.position.toArray(), lines: Object.keys(lines)}),
     };
     resize();
     return api;

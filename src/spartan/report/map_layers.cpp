@@ -54,13 +54,15 @@ class Layers {
 }  // namespace
 
 Result<std::string> map_layers(SavedMap& saved, std::int64_t most_cells) {
-  const auto view = saved.map().view(saved.map().extent());
+  GlobalMap& map = saved.map();
+  const int step = map.overview_step(most_cells);
+  const bool all = map.extent().cells() <= GlobalMap::kMostCells;
+  const auto view = all ? map.view(map.extent()) : map.overview(step);
   if (!view) return failure(view);
   const auto colours = saved.cell_colours(*view);
   if (!colours) return failure(colours);
   const Traversability shape = view->shape(saved.options().mapping.map, ThreadPool(1));
-  const double excess = static_cast<double>(view->window.cells()) / static_cast<double>(most_cells);
-  Layers layers(*view, std::max(1, static_cast<int>(std::ceil(std::sqrt(excess)))));
+  Layers layers(*view, all ? step : 1);
   layers.add("elevation_m", "float32", [&](int c, int r) { return view->elevation_m(c, r); });
   layers.add("sigma_m", "float32", [&](int c, int r) { return std::sqrt(view->variance_m2(c, r)); });
   layers.add("cost", "float32", [&](int c, int r) { return shape.cost(c, r); });

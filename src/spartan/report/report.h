@@ -50,8 +50,8 @@ std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t fr
 /// The global map as a few arrays, for drawing in a browser: a JSON header with the layers and their places, padded to
 /// a multiple of four bytes, behind its length (4 bytes, little endian); then the layers `elevation_m`, `sigma_m`,
 /// `cost` (float32, NaN unknown), `class` (bytes, as in map files) and `colour` (three bytes a cell, of the images), in
-/// rows from the north. Maps of more cells are thinned to every second, third … row and column. Codes: those of
-/// GlobalMap::view.
+/// rows from the north. Maps of more cells are thinned to every second, third … row and column; beyond
+/// GlobalMap::kMostCells they are those of GlobalMap::overview(). Codes: those of GlobalMap::view().
 Result<std::string> map_layers(SavedMap& saved, std::int64_t most_cells);
 
 /// The two trajectories of a comparison.

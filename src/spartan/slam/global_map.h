@@ -114,6 +114,13 @@ class GlobalMap {
   /// gigabyte.
   Result<MapView> view(const LatticeWindow& window);
   static constexpr std::int64_t kMostCells = 8'000'000;
+  /// The whole map in cells of `step` times the size, for maps that are too large to be rendered: the means of
+  /// elevation and variance of the observed cells in each, their lowest and highest points, the sum of their counts,
+  /// the largest log-odds and the most severe class (obstacle, cavity, free). Submaps that overlap are not fused.
+  /// Codes: as view().
+  Result<MapView> overview(int step);
+  /// The smallest step of overview() with at most `most_cells` cells in the window of all tiles, 1 or more.
+  int overview_step(std::int64_t most_cells) const;
   /// Bounding window of all tiles; empty for an empty map.
   LatticeWindow extent() const;
   /// Disjoint windows of at most `side` by `side` cells that cover all tiles.
@@ -157,6 +164,7 @@ class GlobalMap {
   LatticeWindow window_of_tile(const TileKey& key) const;
   Status render_aligned(const Submap& submap, MapView& view, std::vector<MapCell>& cells);
   Status render_resampled(const Submap& submap, MapView& view, std::vector<MapCell>& cells);
+  Status summarize(const Submap& submap, MapView& view, Image<float>& cells);
   CellFusion fusion() const;
 
   GlobalMapOptions options_;

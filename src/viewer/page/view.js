@@ -5,7 +5,7 @@
   const hasWebGl = Boolean(document.createElement('canvas').getContext('webgl'));
   if (!hasWebGl) at('scene').textContent = 'This browser does not draw in 3D (WebGL).';
   const scene = hasWebGl ? makeScene(at('scene')) : new Proxy({}, {get: () => () => null}), plots = makePlots(at('plots'), index => show(index));
-  let run = null, frames = null, now = 0, playing = null, mapShown = 0, shownView = -1, request = 0;
+  let run = null, frames = null, now = 0, playing = null, mapShown = 0, nextMap = 0, shownView = -1, request = 0;
   const errors = [];
 
   const get = async (path, kind = 'json') => {
@@ -110,15 +110,18 @@
     frames.total = more.total;
     return frames;
   };
+  // A growing map takes longer and longer to make: at most a tenth of the time is spent on it.
   const showMap = async () => {
-    if (run.map_version === mapShown) return;
+    if (run.map_version === mapShown || (!run.ended && performance.now() < nextMap)) return;
+    const asked = performance.now();
     try {
       scene.setMap(await get('/api/map', 'buffer'));
       mapShown = run.map_version;
       at('scene-note').textContent = '';
-    } catch (error) {  // too large for one image, for example
+    } catch (error) {
       at('scene-note').textContent = `No map: ${error.message}`;
     }
+    nextMap = performance.now() + 9 * (performance.now() - asked);
     paint();
   };
   // When a run ends, its smoothed trajectory changes frames that are here already: all are asked for again.

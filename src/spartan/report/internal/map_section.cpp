@@ -18,6 +18,7 @@ namespace spartan::internal {
 namespace {
 
 constexpr std::size_t kMostMaps = 6;
+constexpr std::int64_t kMostOverviewCells = 1'000'000;
 constexpr double kMostDecades = 4;  // of points in a cell
 
 // The names of MatchStatus with spaces.
@@ -92,17 +93,12 @@ Result<GlobalMapFigures> global_map_figures(const std::string& run, RunStore& st
   if (!saved) return failure(saved);
   GlobalMap& map = saved->map();
   const LatticeWindow extent = map.extent();
-  if (extent.cells() > GlobalMap::kMostCells) {
-    figures.coverage = fmt::format(
-        "<p>The global map, {:.0f} m × {:.0f} m, is too large for one image: <code>spartan map export --window</code> "
-        "shows a part of it.</p>\n",
-        extent.width * map.cell_m(), extent.height * map.cell_m());
-    return figures;
-  }
-  const auto view = map.view(extent);
+  const bool all = extent.cells() <= GlobalMap::kMostCells;
+  const auto view = all ? map.view(extent) : map.overview(map.overview_step(kMostOverviewCells));
   if (!view) return failure(view);
   figures.map = map_plot(view->elevation_m, view->kind, view->place(), "Global map");
   Plot coverage = coverage_plot(*view);
+  if (!all) coverage.title += fmt::format(", summarized in cells of {:.2g} m", view->cell_m);
   name_world_axes(coverage, heading_east);
   figures.coverage = to_html(coverage);
   return figures;

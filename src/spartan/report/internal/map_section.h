@@ -12,8 +12,8 @@ namespace spartan::internal {
 
 /// The global map of a run.
 struct GlobalMapFigures {
-  std::optional<Plot> map;  ///< none where it is empty or too large for one image (GlobalMap::kMostCells)
-  std::string coverage;     ///< HTML: the number of points in each cell, or why there is no image; empty without a map
+  std::optional<Plot> map;  ///< none where it is empty
+  std::string coverage;     ///< HTML: the number of points in each cell; empty without a map
 };
 /// `heading_east`: whether x of the world is east, by a compass. Codes: those of SavedMap::open() and
 /// GlobalMap::view().

@@ -81,7 +81,6 @@ Result<std::string> scene_section(const std::string& run, RunStore& store, const
   if (tiles->empty() || scene_files().empty()) return std::string();
   auto saved = SavedMap::open(run);
   if (!saved) return failure(saved);
-  if (saved->map().extent().cells() > GlobalMap::kMostCells) return std::string();
   const auto map = map_layers(*saved, kMostSceneCells);
   if (!map) return failure(map);
   std::string html = kFigure + data_element("scene-map", base64(*map)) +

@@ -9,8 +9,8 @@
 
 namespace spartan::internal {
 
-/// HTML with the scripts of scene_files() and their data; empty without a map, where it is larger than
-/// GlobalMap::kMostCells, and where the program was built without three.js. Codes: those of SavedMap::open().
+/// HTML with the scripts of scene_files() and their data; empty without a map and where the program was
+/// built without three.js. Codes: those of SavedMap::open().
 Result<std::string> scene_section(const std::string& run, RunStore& store, const std::vector<FrameRecord>& frames);
 
 }  // namespace spartan::internal

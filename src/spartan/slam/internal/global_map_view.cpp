@@ -1,18 +1,15 @@
 // Views of the global map: windows rendered from its submaps, its extent, samples.
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <utility>
 
 #include "spartan/slam/global_map.h"
+#include "spartan/slam/internal/blank_map_view.h"
 
 namespace spartan {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr int kTileSide = Tile::kSide;
 
 }  // namespace
@@ -99,28 +96,15 @@ Status GlobalMap::render_resampled(const Submap& submap, MapView& view, std::vec
 }
 
 Result<MapView> GlobalMap::view(const LatticeWindow& window) {
-  if (window.cells() > kMostCells) {
-    return failure(
-        ErrorCode::usage,
-        fmt::format("the window has {} x {} cells, more than the limit of a view", window.width, window.height), "",
-        "`spartan map export --window` exports a part of the map");
-  }
-  MapView view;
-  view.window = window;
-  view.cell_m = cell_m_;
+  auto blank = internal::blank_map_view(window, cell_m_, kMostCells);
+  if (!blank) return failure(blank);
+  MapView view = std::move(*blank);
   std::vector<MapCell> cells(static_cast<std::size_t>(window.width) * static_cast<std::size_t>(window.height));
   for (const Submap& submap : submaps_) {
     const bool aligned = submap.lattice_offset(cell_m_).has_value();
     if (Status s = aligned ? render_aligned(submap, view, cells) : render_resampled(submap, view, cells); !s)
       return failure(s);
   }
-  for (Image<float>* layer :
-       {&view.elevation_m, &view.elevation_min_m, &view.elevation_max_m, &view.variance_m2, &view.common_variance_m2})
-    *layer = Image<float>(window.width, window.height, kNaN);
-  for (Image<float>* layer : {&view.count, &view.occupancy_logodds})
-    *layer = Image<float>(window.width, window.height, 0.0F);
-  view.kind = Image<GroundClass>(window.width, window.height);
-  view.stop = Image<std::int32_t>(window.width, window.height, -1);
   std::size_t i = 0;
   for (int row = 0; row < window.height; ++row) {
     for (int column = 0; column < window.width; ++column, ++i) {
