@@ -254,6 +254,19 @@ def take_screenshot(page, path, width):
     page.screenshot(path=path, full_page=True)
 
 
+def check_long_drive(page):
+    """Trajectories of kilometres are in view, too."""
+    page.evaluate("""async () => {
+      const frames = await (await fetch('/api/frames?from=0')).json();
+      for (const kind of ['pose', 'odometry', 'slam', 'localization', 'smoothed'])
+        frames[kind] = frames[kind].map(p => p && p.map((v, i) => i < 3 ? 2e4 * v : v));
+      spartan.scene.setFrames(frames);
+      spartan.scene.fromAbove(); }""")
+    page.wait_for_timeout(1000)
+    colours = pixels_of(page, "#scene canvas")
+    check(colours > 2, f"a drive of 10 km is drawn: {colours} colours")
+
+
 # The time of a frame in which nothing is drawn: that of the browser.
 CLEAR = """async () => { const canvas = document.querySelector('canvas'), gl = canvas.getContext('webgl2') || canvas.getContext('webgl');
   const times = []; let last = performance.now();
@@ -288,6 +301,7 @@ def check_in_browser(program, run, recording, screenshots):
               for (let i = 0; i < 20; ++i) { const t = document.getElementById('time'); t.value = Math.floor(i * n / 20); t.dispatchEvent(new Event('input')); }
               return (performance.now() - begin) / 20; }""")
             clear = page.evaluate(CLEAR)
+            check_long_drive(page)
             state = page.evaluate("() => [spartan.state().total, spartan.scene.state().vertices]")
             print(f"{state[0]} frames, {state[1]} vertices: turning the scene {sum(times[-40:]) / 40:.1f} ms a frame (mean of the last "
                   f"40 of 80, of the first ten {sum(times[:10]) / 10:.1f}; {moving} of {every} triangles; clearing the "
