@@ -1,6 +1,7 @@
 """Bags: recordings out and in, results out, read back by rosbags."""
 
 import filecmp
+import shutil
 import subprocess
 import sys
 
@@ -11,8 +12,8 @@ import spartan
 from conftest import heights_above
 
 bags = pytest.importorskip("spartan.bags")
+from bag_files import pose_of, read_bag, rewritten, stamp_of  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
-from rosbags.typesys import Stores, get_typestore  # noqa: E402
 
 from spartan.bags import _import  # noqa: E402
 
@@ -21,17 +22,27 @@ IN_AND_OUT = [*KINDS, ("drive.mcap", "foxglove")]
 TRAJECTORIES = [f"trajectory_{kind}.tum" for kind in ("odometry", "slam", "localization", "smoothed")]
 
 
-def read(path):
-    """Topic, type and message of all messages."""
-    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-        return [(c.topic, c.msgtype, reader.deserialize(raw, c.msgtype)) for c, _, raw in reader.messages()]
+@pytest.fixture(scope="session")
+def turned(stops, stops_run, tmp_path_factory):
+    """The recording with stops and its run, with an IMU that is turned against the body."""
+    folder = tmp_path_factory.mktemp("turned")
+    shutil.copytree(stops, folder / "rec")
+    with (folder / "rec" / "rig.yaml").open("a") as rig:
+        rig.write("imu:\n  translation_m: [0.2, 0.1, 0.3]\n  roll_pitch_yaw_deg: [0, 0, 90]\n")
+    spartan.run(folder / "rec", folder / "whole", stops_run.options)
+    return folder / "rec", folder / "whole"
+
+
+def readings(sample):
+    """All numbers of a sample of a sensor."""
+    names = ("gyro_rad_s", "accel_m_s2", "left_m", "right_m", "heading_rad", "roll_rad", "pitch_rad", "sigma_rad")
+    return [np.asarray(getattr(sample, name)).tolist() for name in names if hasattr(sample, name)]
 
 
 @pytest.mark.parametrize("name, storage", IN_AND_OUT)
-@pytest.mark.parametrize("which", ["drive", "stops"])
-def test_a_recording_goes_through_a_bag(small_runs, drive, stops, tmp_path, which, name, storage):
-    folder = drive if which == "drive" else stops
-    finished = small_runs / ("drive_run" if which == "drive" else "stops/whole")
+@pytest.mark.parametrize("which", ["drive", "stops", "turned"])
+def test_a_recording_goes_through_a_bag(small_runs, drive, stops, turned, tmp_path, which, name, storage):
+    folder, finished = {"drive": (drive, small_runs / "drive_run"), "stops": (stops, small_runs / "stops/whole"), "turned": turned}[which]
     written = bags.export_recording(folder, tmp_path / name, storage=storage)
     counts = bags.import_bag(tmp_path / name, tmp_path / "recording")
     assert counts["frames"] == written and counts["unpaired"] == counts["rejected"] == 0
@@ -42,19 +53,11 @@ def test_a_recording_goes_through_a_bag(small_runs, drive, stops, tmp_path, whic
         if isinstance(a, spartan.StereoFrame):
             assert np.array_equal(a.left, b.left) and np.array_equal(a.right, b.right)
             assert (a.pair, a.position_id, a.pan_rad, a.right_stamp_ns) == (b.pair, b.position_id, b.pan_rad, b.right_stamp_ns)
+        else:
+            assert readings(a) == readings(b)
     options = spartan.Run(finished).options
     run = spartan.run(tmp_path / "recording", tmp_path / "run", None if which == "drive" else options)
     assert all(filecmp.cmp(run.path / t, finished / t, shallow=False) for t in TRAJECTORIES)
-
-
-def rewritten(source, target, change):
-    """A copy of a bag of ROS 1 whose messages went through `change`, which returns a list of (topic, message)."""
-    with bags.BagWriter(target) as out:
-        for topic, _, message in read(source):
-            header = getattr(message, "header", None)
-            stamp = 0 if header is None else _import._stamp(message)
-            for name, each in change(out.messages, topic, message):
-                out.write(name, stamp, each)
 
 
 def test_the_calibration_is_found_in_camera_info_and_tf(drive, drive_run, tmp_path):
@@ -98,7 +101,7 @@ def test_compressed_and_coloured_images(drive, tmp_path, compressed):
         pixels = np.array(message.data).reshape(message.height, message.width)
         if not compressed:
             colour = np.stack([pixels // 2, pixels, 255 - pixels], axis=2)  # as bgr8
-            return [(topic, messages.image(_import._stamp(message), "camera", colour, "bgr8"))]
+            return [(topic, messages.image(stamp_of(message), "camera", colour, "bgr8"))]
         file = io.BytesIO()
         PIL.Image.fromarray(pixels).save(file, "png")
         data = np.frombuffer(file.getvalue(), np.uint8)
@@ -127,15 +130,10 @@ def test_wheels_of_planar_odometry():
     assert left == pytest.approx(1.7, rel=1e-4) and right == pytest.approx(2.3, rel=1e-4)
 
 
-def matrix(transform):
-    t, q = transform.translation, transform.rotation
-    return spartan.Pose.from_quaternion([q.x, q.y, q.z, q.w], [t.x, t.y, t.z])
-
-
 @pytest.mark.parametrize("name, storage", KINDS)
 def test_the_results_of_a_run_are_messages_of_ros(drive_run, tmp_path, name, storage):
     bags.export_run(drive_run, tmp_path / name, storage=storage)
-    messages = read(tmp_path / name)
+    messages = read_bag(tmp_path / name)
     types = {topic: kind for topic, kind, _ in messages}
     pair = drive_run.rig.pairs[0].name
     assert types == {
@@ -146,13 +144,13 @@ def test_the_results_of_a_run_are_messages_of_ros(drive_run, tmp_path, name, sto
     of = lambda topic: [message for each, _, message in messages if each == topic]
     best = drive_run.trajectory()
     path = of("/spartan/path")[0]
-    assert [_import._stamp(p) for p in path.poses] == list(best.stamps_ns)
+    assert [stamp_of(p) for p in path.poses] == list(best.stamps_ns)
     np.testing.assert_array_equal([[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in path.poses], best.positions)
     # The product of /tf is the pose.
     for message, pose in zip(of("/tf"), best):
         first, second = message.transforms
         assert (first.header.frame_id, first.child_frame_id, second.child_frame_id) == ("map", "odom", "base_link")
-        product = matrix(first.transform) @ matrix(second.transform)
+        product = pose_of(first.transform) @ pose_of(second.transform)
         np.testing.assert_allclose(product.matrix(), pose.pose.matrix(), atol=1e-12)
     # Occupancy and GridMap are one map: grid_map's (0, 0) has the largest x and y.
     view, grid, occupancy = drive_run.map().view(), of("/spartan/map")[0], of("/spartan/occupancy")[0]
@@ -177,8 +175,8 @@ def test_the_results_of_a_run_are_messages_of_ros(drive_run, tmp_path, name, sto
 
 def test_point_clouds_lie_on_the_map(drive_run, tmp_path):
     bags.export_run(drive_run, tmp_path / "run.bag")
-    messages = read(tmp_path / "run.bag")
-    poses = {_import._stamp(m.transforms[0]): matrix(m.transforms[0].transform) @ matrix(m.transforms[1].transform)
+    messages = read_bag(tmp_path / "run.bag")
+    poses = {stamp_of(m.transforms[0]): pose_of(m.transforms[0].transform) @ pose_of(m.transforms[1].transform)
              for topic, _, m in messages if topic == "/tf"}
     world, differences = drive_run.map(), []
     for topic, _, cloud in messages:
@@ -188,7 +186,7 @@ def test_point_clouds_lie_on_the_map(drive_run, tmp_path):
         assert kinds == {"x": (0, 7), "y": (4, 7), "z": (8, 7), "rgb": (12, 7), "sigma_m": (16, 7)}
         values = np.array(cloud.data).view(np.float32).reshape(-1, cloud.point_step // 4)
         assert cloud.header.frame_id == "base_link" and len(values) == cloud.width
-        points = poses[_import._stamp(cloud)] @ values[::7, :3].astype(np.float64)
+        points = poses[stamp_of(cloud)] @ values[::7, :3].astype(np.float64)
         differences += heights_above(world, points)
     assert len(differences) > 200
     assert abs(np.median(differences)) < 0.01 and np.percentile(np.abs(differences), 90) < 0.05
@@ -197,11 +195,11 @@ def test_point_clouds_lie_on_the_map(drive_run, tmp_path):
 def test_disparity_images_are_those_of_the_run(drive_run, tmp_path):
     bags.export_run(drive_run, tmp_path / "run.bag")
     pair = drive_run.rig.pairs[0]
-    images = [m for topic, _, m in read(tmp_path / "run.bag") if topic == f"/{pair.name}/disparity"]
+    images = [m for topic, _, m in read_bag(tmp_path / "run.bag") if topic == f"/{pair.name}/disparity"]
     assert images
     for image in images:
         values = np.array(image.image.data).view(np.float32).reshape(image.image.height, image.image.width)
-        expected = spartan.read_disparity(drive_run.path / "terrain" / f"{_import._stamp(image)}.pfm")
+        expected = spartan.read_disparity(drive_run.path / "terrain" / f"{stamp_of(image)}.pfm")
         assert np.array_equal(np.where(values < image.min_disparity, np.nan, values), expected, equal_nan=True)
         assert image.T == pytest.approx(0.12) and image.f == pytest.approx(260)
 
@@ -263,11 +261,31 @@ def test_the_command(drive, drive_run, tmp_path):
     assert "has no topic /a, /b" in text
 
 
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+def test_latched_topics_of_ros_2_reach_late_subscribers(drive, drive_run, tmp_path, storage):
+    """Their publishers offer what tf2 asks for of /tf_static; those of other topics have the default settings."""
+    bags.export_recording(drive, tmp_path / "recording", storage=storage)
+    bags.export_run(drive_run, tmp_path / "run", storage=storage)
+    latched = {"/tf_static", "/spartan/recording", "/spartan/path", "/spartan/map", "/spartan/occupancy"}
+    found = set()
+    for name in ("recording", "run"):
+        with AnyReader([tmp_path / name]) as reader:
+            for connection in reader.connections:
+                offered = [(q.history.name, q.depth, q.reliability.name, q.durability.name)
+                           for q in connection.ext.offered_qos_profiles]
+                expected = [("KEEP_LAST", 1, "RELIABLE", "TRANSIENT_LOCAL")] if connection.topic in latched else []
+                assert offered == expected, connection.topic
+                found.add(connection.topic)
+        (file,) = set((tmp_path / name).iterdir()) - {tmp_path / name / "metadata.yaml"}
+        assert b"durability: transient_local" in file.read_bytes()
+    assert latched < found and "/tf" in found
+
+
 def test_mcap_has_the_types_and_stamps(drive_run, tmp_path):
     reader = pytest.importorskip("mcap.reader")
     bags.export_run(drive_run, tmp_path / "run", storage="mcap")
     (file,) = (tmp_path / "run").glob("*.mcap")
-    expected = {topic: kind for topic, kind, _ in read(tmp_path / "run")}
+    expected = {topic: kind for topic, kind, _ in read_bag(tmp_path / "run")}
     found, stamps = {}, []
     with file.open("rb") as stream:
         for schema, channel, message in reader.make_reader(stream).iter_messages():

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from spartan import _core
+from spartan.bags._rigs import with_masks_of, with_readings_in_body
 from spartan.bags._writer import MessageWriter, open_writer
 
 DESCRIPTION_TOPIC = "/spartan/recording"
@@ -22,11 +25,13 @@ def optical_frame(pair: str, side: str) -> str:
 
 
 def _description(recording: _core.Recording) -> str:
-    """What messages of ROS have no place for: the rig with its models and errors, gravity, and the noise of the sensors."""
+    """What messages of ROS have no place for: the rig with its models, errors and self-masks, gravity, and the noise of
+    the sensors. The rig is that of readings in the axes of the body, as `/imu` has them."""
     noise = recording.noise
+    rig, masks = with_masks_of(with_readings_in_body(recording.rig), Path(recording.rig_source).parent)
     return json.dumps({"schema": 1, "name": recording.name, "gravity_m_s2": recording.gravity_m_s2,
                        "noise": {kind: getattr(noise, kind).to_yaml() for kind in ("imu", "compass", "inclinometer")},
-                       "rig": recording.rig.to_yaml()})
+                       "rig": rig.to_yaml(), "masks": {name: base64.b64encode(file).decode() for name, file in masks.items()}})
 
 
 def _camera_info(bag: MessageWriter, rig: _core.Rig, pair: _core.StereoPair, side: str, stamp_ns: int) -> Any:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace, TracebackType
 from typing import Any, Self
@@ -29,15 +30,15 @@ from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from foxglove_schemas_protobuf.Vector2_pb2 import Vector2
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
-from google.protobuf.message import DecodeError, Message
+from google.protobuf.message import Message
 from google.protobuf.timestamp_pb2 import Timestamp
-from mcap.exceptions import McapError
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
 
-from spartan._errors import Error
 from spartan.bags._messages import Messages
+from spartan.bags._reader import damaged
+from spartan.bags._writer import UnfinishedOutput, output_errors
 
 _FLOAT32, _FLOAT64 = PackedElementField.FLOAT32, PackedElementField.FLOAT64
 _NUMBERS = {name: {"type": "number"} for name in "xyz"}
@@ -173,43 +174,53 @@ class FoxgloveWriter:
     """Takes messages of ROS 2, as BagWriter does, and writes them with the schemas of Foxglove."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        self.path, self.messages = Path(path), Messages(ros1=False)
-        if self.path.exists():
-            raise Error("output", "exists", str(path), "choose another name")
+        self._output = UnfinishedOutput(path)
+        self.path, self.messages = self._output.path, Messages(ros1=False)
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
 
     def __enter__(self) -> Self:
+        self._output.begin()
         try:
-            self._file = self.path.open("wb")
-        except OSError as error:
-            raise Error("output", str(error), str(self.path)) from error
-        self._writer = Writer(self._file)
-        self._writer.start(profile="", library="spartan")
+            with output_errors(self.path):
+                self._file = self._output.part.open("wb")
+                self._writer = Writer(self._file)
+                self._writer.start(profile="", library="spartan")
+        except BaseException:
+            self._output.discard()
+            raise
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._writer.finish()  # type: ignore[no-untyped-call]
-        self._file.close()
+        try:
+            with suppress(OSError) if kind is not None else output_errors(self.path), self._file:
+                if kind is None:
+                    self._writer.finish()  # type: ignore[no-untyped-call]
+            if kind is None:
+                self._output.finish()
+        finally:
+            self._output.discard()
 
     def write(self, topic: str, stamp_ns: int, message: Any, *, latched: bool = False) -> None:
         """Appends a message; the type of a topic is that of its first message."""
         if message.__msgtype__ in _CONVERTED:
             converted = _CONVERTED[message.__msgtype__](message)
             name, data, encoding = converted.DESCRIPTOR.full_name, converted.SerializeToString(), "protobuf"
-            if name not in self._schemas:
-                self._schemas[name] = register_schema(self._writer, type(converted))
         else:
             name, values = _as_json(message)
             data, encoding = json.dumps(values).encode(), "json"
+        with output_errors(self.path):
             if name not in self._schemas:
-                schema = {"title": name, "type": "object", "properties": _JSON_SCHEMAS[name]}
-                self._schemas[name] = self._writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
-        if topic not in self._channels:
-            self._channels[topic] = self._writer.register_channel(topic, encoding, self._schemas[name])
-        self._writer.add_message(self._channels[topic], log_time=stamp_ns, publish_time=stamp_ns, data=data)
+                if encoding == "protobuf":
+                    self._schemas[name] = register_schema(self._writer, type(converted))
+                else:
+                    schema = {"title": name, "type": "object", "properties": _JSON_SCHEMAS[name]}
+                    self._schemas[name] = self._writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
+            if topic not in self._channels:
+                self._channels[topic] = self._writer.register_channel(topic, encoding, self._schemas[name])
+            self._writer.add_message(self._channels[topic], log_time=stamp_ns, publish_time=stamp_ns, data=data)
 
 
 def _header(message: Any, frame: str | None = None) -> SimpleNamespace:
@@ -281,31 +292,38 @@ def is_foxglove_file(path: str | os.PathLike[str]) -> bool:
     try:
         with Path(path).open("rb") as file:
             summary = make_reader(file).get_summary()
-    except (OSError, McapError, ValueError):
+    except Exception:  # a damaged file makes the reader raise errors of many kinds
         return False
     return summary is not None and any(each.message_encoding == "protobuf" for each in summary.channels.values())
 
 
 class FoxgloveFile:
-    """The messages of an MCAP file as messages of ROS 2; those with other schemas are left out."""
+    """The messages of an MCAP file as messages of ROS 2; those with other schemas are left out (MessageReader)."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
         self._types: dict[str, str] = {}
+        self._empty: set[str] = set()
         with self.path.open("rb") as file:
             summary = make_reader(file).get_summary()
         assert summary is not None  # is_foxglove_file()
+        counts = None if summary.statistics is None else summary.statistics.channel_message_counts
         for channel in summary.channels.values():
             name = summary.schemas[channel.schema_id].name if channel.schema_id in summary.schemas else ""
             kind = _READ[name][0] if name in _READ else _JSON_TYPES.get(name)
             if kind is not None:
                 self._types[channel.topic] = kind
+                if counts is not None and not counts.get(channel.id, 0):
+                    self._empty.add(channel.topic)
 
     def close(self) -> None:
         """The file is open only while messages are read."""
 
     def types(self) -> dict[str, str]:
         return dict(self._types)
+
+    def empty_topics(self) -> set[str]:
+        return set(self._empty)
 
     def messages(self, topics: set[str]) -> Iterator[tuple[str, Any]]:
         wanted = sorted(topics & set(self._types))
@@ -320,8 +338,5 @@ class FoxgloveFile:
                         decoded = made()
                         decoded.ParseFromString(message.data)
                         yield channel.topic, converted(decoded)
-        except (McapError, DecodeError, OSError, ValueError, KeyError) as error:
-            raise Error("input", f"cannot be read: {error}", str(self.path)) from error
-
-    def first(self, topic: str) -> Any:
-        return next(iter(self.messages({topic})), (topic, None))[1]
+        except Exception as error:  # a damaged file makes the decoders raise errors of many kinds
+            raise damaged(error, self.path) from error
