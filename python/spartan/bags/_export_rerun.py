@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import importlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from spartan import _core
 from spartan._errors import Error
 from spartan._run import Run
-from spartan.bags._export_run import best_pose
+from spartan.bags._export_run import best_pose, map_view, terrain_of
+from spartan.bags._rectified import RectifiedCameras
+from spartan.bags._rigs import without_masks
+from spartan.bags._writer import UnfinishedOutput
 
 _MOST_POINTS = 50_000  # of a terrain view
 _COLOURS = {"odometry": (230, 159, 0), "slam": (86, 180, 233), "localization": (0, 114, 178), "smoothed": (204, 121, 167)}
@@ -26,11 +31,8 @@ def _log_trajectories(rr: Any, out: Any, run: Run) -> None:
 
 def _log_map(rr: Any, out: Any, run: Run) -> None:
     """The surface as a mesh, coloured as the figure of the map."""
-    try:
-        view = run.map().view()
-    except Error as error:
-        if error.code not in ("input", "usage"):  # a run by odometry alone has no map; too large for one view
-            raise
+    view = map_view(run)
+    if view is None:
         return
     heights, colours = view["elevation_m"], view.render()
     west, _, _, north = view.extent
@@ -51,7 +53,7 @@ def _log_map(rr: Any, out: Any, run: Run) -> None:
 def _log_frames(rr: Any, out: Any, run: Run, recording: _core.Recording | None) -> None:
     imager = None
     if recording is not None:
-        imager = _core.Imager(run.rig, run.options.imaging, threads=1, mask_folder=Path(recording.rig_source).parent)
+        imager = _core.Imager(without_masks(run.rig), run.options.imaging, threads=1)
     for record in run.frames:
         out.set_time("stamp", timestamp=np.datetime64(record.stamp_ns, "ns"))
         out.set_time("frame", sequence=record.frame_id)
@@ -80,16 +82,21 @@ def _log_image(rr: Any, out: Any, recording: _core.Recording, imager: _core.Imag
     out.log(entity, rr.Image(np.array(pair.left)).compress(jpeg_quality=80))
 
 
+def terrain_in_map(run: Run) -> Iterator[tuple[_core.FrameRecord, npt.NDArray[np.float64], npt.NDArray[np.uint8]]]:
+    """Frame, positions in `map` (m, shape (n, 3)) and colours of each terrain view, at most _MOST_POINTS points of it."""
+    for view in terrain_of(run, RectifiedCameras(run.rig, run.options.imaging)):
+        best = best_pose(view.record)
+        assert best is not None  # terrain_of()
+        step = -(-len(view.cloud) // _MOST_POINTS) or 1
+        positions = (best.pose @ view.base_from_world) @ view.cloud.positions[::step]
+        yield view.record, np.asarray(positions), view.cloud.colours[::step]
+
+
 def _log_terrain(rr: Any, out: Any, run: Run) -> None:
-    folder, numbers = run.path / "terrain", {record.stamp_ns: record.frame_id for record in run.frames}
-    for stamp in run.terrain_stamps_ns:
-        if not (folder / f"{stamp}.ply").exists():  # the disk was full
-            continue
-        cloud = _core.PointCloud.load(folder / f"{stamp}.ply")
-        step = -(-len(cloud) // _MOST_POINTS) or 1
-        out.set_time("stamp", timestamp=np.datetime64(stamp, "ns"))
-        out.set_time("frame", sequence=numbers[stamp])
-        out.log("map/terrain", rr.Points3D(cloud.positions[::step], colors=cloud.colours[::step]))
+    for record, positions, colours in terrain_in_map(run):
+        out.set_time("stamp", timestamp=np.datetime64(record.stamp_ns, "ns"))
+        out.set_time("frame", sequence=record.frame_id)
+        out.log("map/terrain", rr.Points3D(positions, colors=colours))
 
 
 def export_rerun(
@@ -99,21 +106,28 @@ def export_rerun(
     its three standard deviations, terrain points, and health, by time and by frame. With the `recording` that was run also
     the rectified left images, in front of their camera.
 
-    Needs `pip install spartan[rerun]`. Raises Error; ImportError without Rerun.
+    Needs `pip install spartan[rerun]`. Raises Error, after which there is no file; ImportError without Rerun.
     """
     rr: Any = importlib.import_module("rerun")
     opened = run if isinstance(run, Run) else Run(run)
     if not opened.frames:
         raise Error("input", "has no frames", str(opened.path))
-    if Path(path).exists():
-        raise Error("output", "exists", str(path), "choose another name")
+    output = UnfinishedOutput(path)
     source = None if recording is None else _core.open_recording(recording)
-    out = rr.RecordingStream("spartan", recording_id=opened.path.name)
-    out.save(Path(path))
-    out.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    _log_trajectories(rr, out, opened)
-    _log_map(rr, out, opened)
-    _log_frames(rr, out, opened, source)
-    _log_terrain(rr, out, opened)
-    out.flush()
-    out.disconnect()
+    output.begin()
+    try:
+        out = rr.RecordingStream("spartan", recording_id=opened.path.name)
+        out.save(output.part)
+        out.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        _log_trajectories(rr, out, opened)
+        _log_map(rr, out, opened)
+        _log_frames(rr, out, opened, source)
+        _log_terrain(rr, out, opened)
+        out.flush()
+        out.disconnect()
+        output.finish()
+    except (OSError, RuntimeError) as error:  # of Rerun's thread that writes the file
+        raise Error("output", f"cannot be written: {error}", str(path),
+                    "free space there, or choose a place that can be written") from error
+    finally:
+        output.discard()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import os
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +16,15 @@ from spartan._errors import Error
 from spartan._run import Run
 from spartan.bags._export_recording import optical_frame
 from spartan.bags._messages import Messages, world_covariance
+from spartan.bags._rectified import RectifiedCameras, camera_of_cloud
 from spartan.bags._writer import MessageWriter, open_writer
+
+_LOG = logging.getLogger("spartan")
+
+
+def rectified_frame(pair: str) -> str:
+    """Optical frame of the rectified left images of a pair."""
+    return f"{pair}_left_rectified_frame"
 
 
 def _with_covariance(messages: Messages, pose: _core.UncertainPose) -> Any:
@@ -32,10 +43,10 @@ def _odometry(messages: Messages, record: _core.FrameRecord) -> Any:
                          pose=_with_covariance(messages, record.odometry), twist=twist)
 
 
-def _point_cloud(messages: Messages, stamp_ns: int, cloud: _core.PointCloud, base_from_map: _core.Pose) -> Any:
+def _point_cloud(messages: Messages, stamp_ns: int, cloud: _core.PointCloud, base_from_world: _core.Pose) -> Any:
     """In `base_link` at the time of the image; rgb as PCL packs it."""
     points = np.zeros(len(cloud), [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<u4"), ("sigma_m", "<f4")])
-    moved = np.asarray(base_from_map @ cloud.positions)
+    moved = np.asarray(base_from_world @ cloud.positions)
     for i, axis in enumerate("xyz"):
         points[axis] = moved[:, i]
     colours = cloud.colours.astype(np.uint32)
@@ -53,7 +64,7 @@ def _disparity(messages: Messages, stamp_ns: int, pair: str, values: npt.NDArray
     """Unknown pixels are below min_disparity, as stereo_image_proc writes them."""
     least = float(np.nanmin(values, initial=0.0))  # of distant points, a little below 0
     known = np.where(np.isfinite(values), values, np.float32(least - 1))
-    frame = f"{pair}_left_rectified_frame"
+    frame = rectified_frame(pair)
     window = messages.make("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=values.shape[0],
                            width=values.shape[1], do_rectify=False)
     baseline = {"T" if messages.ros1 else "t": geometry.baseline_m}
@@ -121,19 +132,78 @@ def _write_poses(out: MessageWriter, run: Run) -> None:
         out.write("/spartan/path", end, message, latched=True)
 
 
-def _write_terrain(out: MessageWriter, run: Run) -> None:
-    imager = _core.Imager(run.rig, run.options.imaging, threads=1, mask_folder=run.path)
-    records, files = {record.stamp_ns: record for record in run.frames}, run.path / "terrain"
+@dataclass
+class Terrain:
+    """A terrain view of a run."""
+
+    record: _core.FrameRecord
+    disparities: npt.NDArray[np.float32]
+    cloud: _core.PointCloud
+    base_from_world: _core.Pose  # of the points of the cloud, at the time of the image
+    base_from_left: _core.Pose | None  # of the rectified left camera; None where it is not known
+
+
+def terrain_of(run: Run, cameras: RectifiedCameras) -> Iterator[Terrain]:
+    """The terrain views of frames that have a pose. After a full disk the files of some are not there.
+
+    The pose of the camera in the world of the cloud is found from the cloud itself. With a camera that is fixed to the
+    body it gives that of the body, whether the cloud is in the world of the localization or, as in runs of former
+    versions, of the odometry. The angles of a pan-tilt unit are not in a run: the body has the pose of the localization.
+    """
+    records = {record.stamp_ns: record for record in run.frames}
     for stamp in run.terrain_stamps_ns:
-        record = records[stamp]
-        best = best_pose(record)
-        if best is None or not (files / f"{stamp}.pfm").exists():  # the disk was full
+        record, files = records[stamp], run.path / "terrain" / str(stamp)
+        if best_pose(record) is None or not files.with_suffix(".pfm").exists():
             continue
-        values = _core.read_disparity(files / f"{stamp}.pfm")
-        out.write(f"/{record.pair}/disparity", stamp,
-                  _disparity(out.messages, stamp, record.pair, values, imager.geometry(record.pair)))
-        cloud = _core.PointCloud.load(files / f"{stamp}.ply")
-        out.write("/spartan/terrain", stamp, _point_cloud(out.messages, stamp, cloud, best.pose.inverse()))
+        disparities = _core.read_disparity(files.with_suffix(".pfm"))
+        cloud = _core.PointCloud.load(files.with_suffix(".ply"))
+        world_from_left = camera_of_cloud(disparities, cloud, cameras.geometry(record.pair), run.options.terrain)
+        base_from_left = cameras.body_from_left(record.pair)
+        if world_from_left is not None and base_from_left is not None:
+            base_from_world = base_from_left @ world_from_left.inverse()
+        else:
+            base_from_world = (record.localization or record.odometry).pose.inverse()
+            if world_from_left is not None:
+                base_from_left = base_from_world @ world_from_left
+        yield Terrain(record, disparities, cloud, base_from_world, base_from_left)
+
+
+def _write_static_frames(out: MessageWriter, rig: _core.Rig, cameras: RectifiedCameras, stamp_ns: int) -> None:
+    """Cameras that are fixed to the body, and the frames of their rectified images."""
+    fixed = [(optical_frame(pair.name, side), rig.body_from_camera(getattr(pair, side)))
+             for pair in rig.pairs for side in ("left", "right") if rig.camera(getattr(pair, side)).mount == "body"]
+    fixed += [(rectified_frame(pair.name), pose) for pair in rig.pairs if (pose := cameras.body_from_left(pair.name))]
+    if fixed:
+        transforms = [out.messages.transform(stamp_ns, "base_link", frame, pose) for frame, pose in fixed]
+        out.write("/tf_static", stamp_ns, out.messages.transforms(transforms), latched=True)
+
+
+def _write_terrain(out: MessageWriter, run: Run, cameras: RectifiedCameras) -> None:
+    messages = out.messages
+    for view in terrain_of(run, cameras):
+        pair, stamp, camera = view.record.pair, view.record.stamp_ns, view.base_from_left
+        if camera is None:
+            _LOG.warning("%s: the disparities of the terrain view %d are left out: the angles of its pan-tilt unit are not known",
+                         run.path, stamp)
+        else:
+            if cameras.body_from_left(pair) is None:
+                moved = messages.transform(stamp, "base_link", rectified_frame(pair), camera)
+                out.write("/tf", stamp, messages.transforms([moved]))
+            image = _disparity(messages, stamp, pair, view.disparities, cameras.geometry(pair))
+            out.write(f"/{pair}/disparity", stamp, image)
+        out.write("/spartan/terrain", stamp, _point_cloud(messages, stamp, view.cloud, view.base_from_world))
+
+
+def map_view(run: Run) -> _core.MapView | None:
+    """The whole map; None where the run has none, or one that is too large for a view, which is logged."""
+    try:
+        return run.map().view()
+    except Error as error:
+        if error.code == "usage":
+            _LOG.warning("%s: the map is left out: %s; `spartan map export` writes it", run.path, error.what)
+        elif error.code != "input":  # a run by odometry alone has no map
+            raise
+    return None
 
 
 def export_run(run: Run | str | os.PathLike[str], bag: str | os.PathLike[str], *, storage: str = "sqlite3") -> None:
@@ -141,27 +211,19 @@ def export_run(run: Run | str | os.PathLike[str], bag: str | os.PathLike[str], *
     MCAP file with Foxglove's schemas (.mcap).
 
     `/spartan/odometry` (vision alone, in `odom`), `/spartan/pose` and `/spartan/path` (the best trajectory, in `map`), `/tf`
-    (`map` to `odom` to `base_link`), `/tf_static` (cameras on the body), `/<pair>/disparity`, `/spartan/terrain` (points in
-    `base_link`), `/spartan/map` (GridMap with all layers) and `/spartan/occupancy`.
+    (`map` to `odom` to `base_link`, and rectified cameras on a pan-tilt unit), `/tf_static` (cameras on the body),
+    `/<pair>/disparity`, `/spartan/terrain` (points in `base_link`), `/spartan/map` (GridMap with all layers) and
+    `/spartan/occupancy`. A map of more than 8 million cells is left out. Raises Error; after one there is no bag.
     """
     opened = run if isinstance(run, Run) else Run(run)
     if not opened.frames:
         raise Error("input", "has no frames", str(opened.path))
+    cameras, view = RectifiedCameras(opened.rig, opened.options.imaging), map_view(opened)
     with open_writer(bag, storage) as out:
-        messages, start, end = out.messages, opened.frames[0].stamp_ns, opened.frames[-1].stamp_ns
-        rig = opened.rig
-        fixed = [messages.transform(start, "base_link", optical_frame(pair.name, side),
-                                    rig.body_from_camera(getattr(pair, side)))
-                 for pair in rig.pairs for side in ("left", "right") if rig.camera(getattr(pair, side)).mount == "body"]
-        if fixed:
-            out.write("/tf_static", start, messages.transforms(fixed), latched=True)
+        messages, end = out.messages, opened.frames[-1].stamp_ns
+        _write_static_frames(out, opened.rig, cameras, opened.frames[0].stamp_ns)
         _write_poses(out, opened)
-        _write_terrain(out, opened)
-        try:
-            view = opened.map().view()
-        except Error as error:
-            if error.code != "input":  # a run by odometry alone has no map
-                raise
-        else:
+        _write_terrain(out, opened, cameras)
+        if view is not None:
             out.write("/spartan/map", end, _grid_map(messages, end, view), latched=True)
             out.write("/spartan/occupancy", end, _occupancy(messages, end, view), latched=True)
