@@ -1,6 +1,7 @@
 """Calibrations in bags: self-masks, and the camera_info of rectified images."""
 
 import dataclasses
+import importlib.util
 import json
 import logging
 import shutil
@@ -54,6 +55,8 @@ def test_self_masks_go_through_a_bag(masked, stops_run, tmp_path, name):
     bags.export_run(again, tmp_path / "run.bag")  # geometry alone, wherever the masks are
     (again.path / "rig.yaml").write_text(with_mask((masked / "rig.yaml").read_text().replace("self_mask", "#"), "none.png"))
     bags.export_run(again.path, tmp_path / "again.bag")
+    if importlib.util.find_spec("rerun"):
+        bags.export_rerun(again.path, tmp_path / "again.rrd", recording=tmp_path / "recording")
 
 
 def test_masks_that_a_bag_has_not_got(masked, tmp_path, caplog):

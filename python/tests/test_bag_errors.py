@@ -1,6 +1,7 @@
 """Bags that are damaged, topics that do not fit, and disks that are full: an Error with its code, and nothing half done."""
 
 import dataclasses
+import json
 import logging
 import random
 import resource
@@ -101,7 +102,8 @@ def test_topics_without_messages(tmp_path, storage):
     for target in ("drive.bag", "drive"):
         with bags.BagWriter(tmp_path / target, storage) as out:
             for side in ("left", "right"):  # before the others by name
-                out._connections[f"/a/{side}/image_raw"] = out._connect(f"/a/{side}/image_raw", "sensor_msgs/msg/Image", False)
+                topic = f"/a/{side}/image_raw"
+                out._connections[topic] = out._connect(topic, "sensor_msgs/msg/Image", False)
                 image = out.messages.image(1, side, np.zeros((240, 320), np.uint8), "mono8")
                 out.write(f"/b/{side}/image_raw", 1, image)
         with pytest.raises(spartan.Error, match="has no /b/left/camera_info"):
@@ -121,7 +123,8 @@ def test_topics_of_other_types(stops, tmp_path):
 
 def test_a_description_that_is_damaged(stops, tmp_path):
     bags.export_recording(stops, tmp_path / "ours.bag")
-    for i, text in enumerate(("", "[]", "{}", '{"noise": 1}', '{"rig')):
+    noise = json.dumps({kind: "" for kind in ("imu", "compass", "inclinometer")})
+    for i, text in enumerate(("", "[]", "{}", '{"noise": 1}', '{"rig', f'{{"noise": {noise}, "rig": "cameras: 1"}}')):
 
         def change(messages, topic, message, text=text):
             return [(topic, dataclasses.replace(message, data=text) if topic == "/spartan/recording" else message)]

@@ -19,7 +19,8 @@ def panned(drive, tmp_path_factory):
     folder = tmp_path_factory.mktemp("panned")
     text = spartan.open_recording(drive).rig.to_yaml().replace('mount: "body"', 'mount: "mast"')
     text = text.replace("pose_convention: left_optical", "pose_convention: body")
-    unit = "pan_tilt_units:\n  mast:\n    translation_m: [0.1, 0, 0.3]\n    quaternion_xyzw: [0, 0, 0, 1]\n    rest_angles_rad: [0, 0]\n"
+    unit = ("pan_tilt_units:\n  mast:\n    translation_m: [0.1, 0, 0.3]\n    quaternion_xyzw: [0, 0, 0, 1]\n"
+            "    rest_angles_rad: [0, 0]\n")
     writer = spartan.RecordingWriter(folder / "rec", spartan.Rig.from_yaml(text.replace("cameras:", unit + "cameras:", 1)))
     for frame in spartan.open_recording(drive):
         writer.add(spartan.StereoFrame(frame.left, frame.right, frame.stamp_ns, frame.right_stamp_ns, pair=frame.pair,
@@ -135,3 +136,25 @@ def test_clouds_lie_on_the_map_though_the_odometry_drifts(drifted, tmp_path, nam
     assert sum(map(len, heights)) > 200
     assert all(abs(np.median(each)) < 0.02 for each in heights if len(each) > 20)
     assert abs(np.median(np.concatenate(heights))) < 0.01 and np.percentile(np.abs(np.concatenate(heights)), 90) < 0.05
+
+
+@pytest.mark.parametrize("far_m", [0, 10_000, 50_000])
+@pytest.mark.parametrize("limits", [{}, {"max_range_m": 3.0}, {"point_step_px": 5, "max_range_error": 0.05}])
+def test_the_camera_of_a_cloud(far_m, limits):
+    """Of the points that the options keep; positions are float32, whose steps are 1 mm at 10 km, 4 mm at 50 km."""
+    from spartan.bags._rectified import camera_of_cloud
+
+    options = spartan.TerrainOptions(**limits)
+    geometry = spartan.RectifiedStereo((80, 60), 100, [40, 30], 0.12)
+    rng = np.random.default_rng(3)
+    disparity = rng.uniform(1.5, 40, (60, 80)).astype(np.float32)
+    disparity[rng.random(disparity.shape) < 0.3] = np.nan
+    kept = np.where(disparity < 0.3 / options.max_range_error, np.nan, disparity)
+    world_from_left = spartan.Pose.from_quaternion([0.5, 0.4, -0.2, 1], [far_m, -far_m / 2, 3])
+    cloud = spartan.PointCloud.from_disparity(kept, np.ones_like(kept), np.zeros(kept.shape, np.uint8), geometry, world_from_left,
+                                              step_px=options.point_step_px, max_range_m=options.max_range_m)
+    found = camera_of_cloud(disparity, cloud, geometry, options)
+    assert found is not None and len(cloud) > 30
+    error = (world_from_left.inverse() @ found).log()
+    assert np.linalg.norm(error[:3]) < 1e-4 + 1e-7 * far_m and np.linalg.norm(error[3:]) < 1e-4 + 1e-7 * far_m / 3
+    assert camera_of_cloud(disparity[::-1], cloud, geometry, options) is None

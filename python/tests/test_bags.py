@@ -42,7 +42,8 @@ def readings(sample):
 @pytest.mark.parametrize("name, storage", IN_AND_OUT)
 @pytest.mark.parametrize("which", ["drive", "stops", "turned"])
 def test_a_recording_goes_through_a_bag(small_runs, drive, stops, turned, tmp_path, which, name, storage):
-    folder, finished = {"drive": (drive, small_runs / "drive_run"), "stops": (stops, small_runs / "stops/whole"), "turned": turned}[which]
+    folder, finished = {"drive": (drive, small_runs / "drive_run"), "stops": (stops, small_runs / "stops/whole"),
+                        "turned": turned}[which]
     written = bags.export_recording(folder, tmp_path / name, storage=storage)
     counts = bags.import_bag(tmp_path / name, tmp_path / "recording")
     assert counts["frames"] == written and counts["unpaired"] == counts["rejected"] == 0

@@ -303,7 +303,7 @@ class FoxgloveFile:
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
         self._types: dict[str, str] = {}
-        self._empty: set[str] = set()
+        self._filled: set[str] = set()
         with self.path.open("rb") as file:
             summary = make_reader(file).get_summary()
         assert summary is not None  # is_foxglove_file()
@@ -313,8 +313,8 @@ class FoxgloveFile:
             kind = _READ[name][0] if name in _READ else _JSON_TYPES.get(name)
             if kind is not None:
                 self._types[channel.topic] = kind
-                if counts is not None and not counts.get(channel.id, 0):
-                    self._empty.add(channel.topic)
+                if counts is None or counts.get(channel.id, 0):
+                    self._filled.add(channel.topic)
 
     def close(self) -> None:
         """The file is open only while messages are read."""
@@ -323,7 +323,7 @@ class FoxgloveFile:
         return dict(self._types)
 
     def empty_topics(self) -> set[str]:
-        return set(self._empty)
+        return set(self._types) - self._filled
 
     def messages(self, topics: set[str]) -> Iterator[tuple[str, Any]]:
         wanted = sorted(topics & set(self._types))

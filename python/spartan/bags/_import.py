@@ -154,16 +154,16 @@ def _description_in(bag: MessageReader) -> _Description | None:
     """None of a bag of others. Raises Error where it is damaged."""
     if DESCRIPTION_TOPIC not in bag.types() or DESCRIPTION_TOPIC in bag.empty_topics():
         return None
-    noise = _core.SensorNoise()
+    noise, message = _core.SensorNoise(), first_message(bag, DESCRIPTION_TOPIC)
     try:
-        about = json.loads(first_message(bag, DESCRIPTION_TOPIC).data)
+        about = json.loads(message.data)
         noise.imu = _core.ImuNoise.from_yaml(about["noise"]["imu"])
         noise.compass = _core.CompassNoise.from_yaml(about["noise"]["compass"])
         noise.inclinometer = _core.InclinometerNoise.from_yaml(about["noise"]["inclinometer"])
         masks = {name: base64.b64decode(text) for name, text in about.get("masks", {}).items()}
         rig, missing = with_known_masks(_core.Rig.from_yaml(about["rig"]), masks)
         name, gravity = str(about.get("name") or bag.path.stem), float(about.get("gravity_m_s2") or 9.81)
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (Error, ValueError, KeyError, TypeError, AttributeError) as error:
         raise Error("input", f"the message of {DESCRIPTION_TOPIC} cannot be read: {type(error).__name__}: {error}",
                     str(bag.path), "name the calibration with --rig, and the images with --left and --right") from error
     if missing:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from spartan import _core
 from spartan.bags._rigs import of_gray_images
 
-_LARGEST_RESIDUAL_M = 1e-3  # the median, of float32 coordinates
+_LARGEST_RESIDUAL_M = 1e-3  # the median; more where the steps of the float32 coordinates are larger, beyond 8 km
 
 
 class RectifiedCameras:
@@ -68,4 +68,5 @@ def camera_of_cloud(values: npt.NDArray[np.float32], cloud: _core.PointCloud, ge
     target = cloud.positions.astype(np.float64)
     matrix = _rigid_motion(points[chosen], target)
     residuals = np.linalg.norm(points[chosen] @ matrix[:3, :3].T + matrix[:3, 3] - target, axis=1)
-    return _core.Pose(matrix) if np.median(residuals) < _LARGEST_RESIDUAL_M else None
+    largest = max(_LARGEST_RESIDUAL_M, float(np.spacing(np.abs(cloud.positions).max())))
+    return _core.Pose(matrix) if np.median(residuals) <= largest else None
