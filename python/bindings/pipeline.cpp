@@ -149,6 +149,11 @@ void bind_pipeline(nb::module_& m) {
           "At the end of a drive: applies the map of a stop that is not applied yet. To be called until it returns "
           "None.")
       .def(
+          "finish_terrain",
+          [](PipelineValue& self) { return self.use([](Pipeline& p) { return p.finish_terrain(); }); },
+          "At the end of a drive: the TerrainView that was to be delivered with a later frame; None where there is "
+          "none.")
+      .def(
           "map_view",
           [](PipelineValue& self) -> std::unique_ptr<MapViewValue> {
             return self.use([](Pipeline& p) -> std::unique_ptr<MapViewValue> {

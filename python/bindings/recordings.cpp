@@ -21,22 +21,27 @@ using namespace nb::literals;
 
 namespace spartan::python {
 
-OpenOptions open_options(const std::optional<PathText>& rig, const std::optional<std::string>& format,
-                         const std::optional<std::string>& left, const std::optional<std::string>& right, double fps) {
-  OpenOptions open;
-  if (rig) open.rig_file = *rig;
-  if (format) open.format = value_of(parse_recording_format(*format));
-  open.left_images = left.value_or("");
-  open.right_images = right.value_or("");
-  open.fps = fps;
-  return open;
-}
-
 nb::object object_of(Sample sample) {
   return std::visit([](auto&& each) { return nb::cast(std::forward<decltype(each)>(each)); }, std::move(sample));
 }
 
 namespace {
+
+OpenOptions open_options(const std::optional<PathText>& rig, const std::optional<std::string>& format,
+                         const std::optional<std::string>& left, const std::optional<std::string>& right,
+                         const std::optional<PathText>& times, double fps, int bits, double pair_tolerance_s) {
+  OpenOptions open;
+  if (rig) open.rig_file = *rig;
+  if (format) open.format = value_of(parse_recording_format(*format));
+  open.left_images = left.value_or("");
+  open.right_images = right.value_or("");
+  if (times) open.times_file = *times;
+  open.fps = fps;
+  open.bits = bits;
+  if (!(pair_tolerance_s >= 0)) throw nb::value_error("pair_tolerance_s: must not be negative");
+  open.pair_tolerance_s = pair_tolerance_s;
+  return open;
+}
 
 // Reads on from the position of the recording; one iterator at a time.
 struct SampleIterator {
@@ -116,20 +121,35 @@ void bind_recordings(nb::module_& m) {
         return fmt::format("<Recording '{}' ({}): {} frames>", info.name, name_of(info.format),
                            info.sequence.announced);
       });
+  nb::class_<OpenOptions>(m, "OpenOptions", "How to read a recording, see open_recording().")
+      .def(
+          "__init__",
+          [](OpenOptions* self, const std::optional<PathText>& rig, const std::optional<std::string>& format,
+             const std::optional<std::string>& left, const std::optional<std::string>& right,
+             const std::optional<PathText>& times, double fps, int bits, double pair_tolerance_s) {
+            new (self) OpenOptions(open_options(rig, format, left, right, times, fps, bits, pair_tolerance_s));
+          },
+          nb::kw_only(), "rig"_a = nb::none(), "format"_a = nb::none(), "left"_a = nb::none(), "right"_a = nb::none(),
+          "times"_a = nb::none(), "fps"_a = 0.0, "bits"_a = 0, "pair_tolerance_s"_a = OpenOptions().pair_tolerance_s);
   m.def(
       "open_recording",
       [](const PathText& path, const std::optional<PathText>& rig, const std::optional<std::string>& format,
-         const std::optional<std::string>& left, const std::optional<std::string>& right, double fps) {
-        const OpenOptions options = open_options(rig, format, left, right, fps);
+         const std::optional<std::string>& left, const std::optional<std::string>& right,
+         const std::optional<PathText>& times, double fps, int bits, double pair_tolerance_s) {
+        OpenOptions options = open_options(rig, format, left, right, times, fps, bits, pair_tolerance_s);
+        options.unfinished = true;  // what a live run that was killed has recorded
         const nb::gil_scoped_release free;
         return std::make_unique<RecordingValue>(value_of(open_recording(path, options)));
       },
       "path"_a, nb::kw_only(), "rig"_a = nb::none(), "format"_a = nb::none(), "left"_a = nb::none(),
-      "right"_a = nb::none(), "fps"_a = 0.0,
+      "right"_a = nb::none(), "times"_a = nb::none(), "fps"_a = 0.0, "bits"_a = 0,
+      "pair_tolerance_s"_a = OpenOptions().pair_tolerance_s,
       "Opens a folder or a video file; the layout (Spartan, KITTI, EuRoC, image folders …) is detected. `rig`: a "
       "calibration file to use instead of the recording's own. `left`, `right`: folders or patterns of file names of "
-      "the "
-      "images.");
+      "the images. `times`: file with the times of the frames, instead of the recording's own; `fps`: frames per "
+      "second where there are none. `bits`: significant bits of a sample of 16-bit images; 0: by the calibration or "
+      "the images. `pair_tolerance_s`: largest difference of the stamps of left and right. A recording that is not "
+      "finished has the frames that it has now.");
 }
 
 }  // namespace spartan::python

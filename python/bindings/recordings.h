@@ -22,10 +22,6 @@ struct RecordingValue {
   Guarded<std::unique_ptr<Recording>> stream;
 };
 
-/// The format of its name; none for None. Raises ValueError.
-OpenOptions open_options(const std::optional<PathText>& rig, const std::optional<std::string>& format,
-                         const std::optional<std::string>& left, const std::optional<std::string>& right, double fps);
-
 /// The sample as StereoFrame, ImuSample … or MissingFrame.
 nanobind::object object_of(Sample sample);
 

@@ -13,6 +13,7 @@
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
 #include "bindings/path_text.h"
+#include "bindings/recordings.h"
 #include "bindings/threads.h"
 #include "bindings/trajectory.h"
 #include "spartan/system/run_folder.h"
@@ -77,16 +78,16 @@ nb::ndarray<nb::numpy, double, nb::shape<-1, 6, 6>> covariances(const RunResults
 }
 
 void export_to(const RunResults& run, const std::string& format, const PathText& path,
-               const std::optional<std::string>& trajectory, std::optional<int> threads,
-               const std::optional<PathText>& recording) {
+               const std::optional<std::string>& trajectory, std::optional<int> threads, RecordingValue* recording) {
   const ExportFormat chosen = value_of(parse_export_format(format));
   const std::optional<TrajectoryKind> kind = trajectory ? std::optional(kind_of(run, trajectory)) : std::nullopt;
   const ThreadPool workers = thread_pool(threads);
-  const nb::gil_scoped_release free;
-  if (chosen == ExportFormat::colmap && recording) {
-    const auto opened = value_of(open_recording(*recording));
-    return static_cast<void>(value_of(export_colmap(run.folder.path, *opened, kind, workers, path)));
+  if (chosen == ExportFormat::colmap && recording != nullptr) {
+    return recording->stream.use([&](auto& stream) {
+      static_cast<void>(value_of(export_colmap(run.folder.path, *stream, kind, workers, path)));
+    });
   }
+  const nb::gil_scoped_release free;
   check(export_run(run.folder.path, chosen, kind, workers, path));
 }
 
@@ -187,7 +188,7 @@ void bind_run_results(nb::module_& m) {
           "kind"_a = nb::none())
       .def("covariances", covariances, "kind"_a = nb::none())
       .def("export", export_to, "format"_a, "path"_a, "trajectory"_a = nb::none(), "threads"_a = nb::none(),
-           "recording"_a = nb::none());
+           "recording"_a.none() = nb::none());
 }
 
 }  // namespace spartan::python

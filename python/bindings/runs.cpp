@@ -54,6 +54,7 @@ std::string run_input(const RunRequest& request, const RunHooks& hooks, LiveOpti
   Result<RunOutcome> outcome;
   if (program::scenario_of(request.input) || is_live_address(request.input)) {
     live.log = hooks.log;
+    live.should_stop = hooks.should_stop;
     const auto stream = value_of(open_stream(request.input, request.open, live, request.threads));
     outcome = run_live(*stream, request, hooks);
   } else if (!live.sensors.empty()) {
@@ -101,13 +102,14 @@ std::string run_folder(const PathText& input, const PathText& output, const RunO
   return run_input(request, hooks, live, python);
 }
 
-void report(const PathText& run, const PathText& recording, const PathText& page, const std::optional<PathText>& truth,
-            std::optional<int> threads) {
+void report(const PathText& run, const PathText& recording, const OpenOptions& open, const PathText& page,
+            const std::optional<PathText>& truth, std::optional<int> threads) {
   const int count = thread_count(threads);
   const nb::gil_scoped_release free;
   ReportRequest about;
   about.run = run;
   about.recording = recording;
+  about.open = open;
   const RunFolder folder{run};
   about.options = value_of(load_options<RunOptions>(folder.config()));
   if (truth) about.truth = *truth;
@@ -130,11 +132,10 @@ void bind_runs(nb::module_& m) {
       });
   m.def(
       "run_into_folder",
-      [](const PathText& input, const PathText& output, const RunOptions* options, const std::optional<PathText>& rig,
-         const std::optional<std::string>& format, const std::optional<std::string>& left,
-         const std::optional<std::string>& right, double fps, std::optional<int> threads, int max_frames, bool resume,
-         bool replace, double speed, int passes, const std::optional<PathText>& sensors, const nb::object& progress,
-         const nb::object& frame, const nb::object& log) {
+      [](const PathText& input, const PathText& output, const RunOptions* options, const OpenOptions& open,
+         std::optional<int> threads, int max_frames, bool resume, bool replace, double speed, int passes,
+         const std::optional<PathText>& sensors, const nb::object& progress, const nb::object& frame,
+         const nb::object& log) {
         if (max_frames < 0) throw nb::value_error("max_frames: must not be negative");
         RunRequest request;
         request.threads = thread_count(threads);
@@ -146,16 +147,14 @@ void bind_runs(nb::module_& m) {
         live.speed = speed;
         live.passes = passes;
         if (sensors) live.sensors = *sensors;
-        return run_folder(input, output, options, open_options(rig, format, left, right, fps), request, live, progress,
-                          frame, log);
+        return run_folder(input, output, options, open, request, live, progress, frame, log);
       },
-      "input"_a, "output"_a, "options"_a.none() = nb::none(), nb::kw_only(), "rig"_a = nb::none(),
-      "format"_a = nb::none(), "left"_a = nb::none(), "right"_a = nb::none(), "fps"_a = 0.0, "threads"_a = nb::none(),
+      "input"_a, "output"_a, "options"_a.none() = nb::none(), nb::kw_only(), "open"_a, "threads"_a = nb::none(),
       "max_frames"_a = 0, "resume"_a = false, "replace"_a = false, "speed"_a = 1.0, "passes"_a = 1,
       "sensors"_a = nb::none(), "progress"_a = nb::none(), "frame"_a = nb::none(), "log"_a,
       "See spartan.run(). Returns the text of summary.json.");
-  m.def("write_report", report, "run"_a, "recording"_a, "page"_a, "truth"_a = nb::none(), "threads"_a = nb::none(),
-        "Writes the report page of a run folder.");
+  m.def("write_report", report, "run"_a, "recording"_a, "open"_a, "page"_a, "truth"_a = nb::none(),
+        "threads"_a = nb::none(), "Writes the report page of a run folder.");
 }
 
 }  // namespace spartan::python

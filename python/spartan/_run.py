@@ -89,10 +89,12 @@ class Run:
         *,
         trajectory: str | None = None,
         threads: int | None = None,
-        recording: StrPath | None = None,
+        recording: StrPath | _core.Recording | None = None,
     ) -> None:
         """Writes the run as `tum`, `kitti`, `euroc`, `csv` (trajectory), `colmap` (folder with rectified images and poses;
-        `recording`: the one that was run), `geotiff`, `gltf`, `octomap` (map), `ply` or `pcd` (terrain)."""
+        `recording`: the one that was run, open or its path), `geotiff`, `gltf`, `octomap` (map), `ply` or `pcd` (terrain)."""
+        if recording is not None and not isinstance(recording, _core.Recording):
+            recording = _core.open_recording(recording)
         self._results.export(format, path, trajectory, threads, recording)
 
     def __repr__(self) -> str:
@@ -108,7 +110,10 @@ def run(
     format: str | None = None,
     left: str | None = None,
     right: str | None = None,
+    times: StrPath | None = None,
     fps: float = 0,
+    bits: int = 0,
+    pair_tolerance_s: float = 0.005,
     threads: int | None = None,
     max_frames: int = 0,
     resume: bool = False,
@@ -125,7 +130,7 @@ def run(
 
     input: folder or video of a recording, or the address of a live stream (`replay:FOLDER`, `live:RIG`, `sim:SCENARIO`).
     output: run folder to create. An existing one raises Error without `resume` or `replace`.
-    rig, format, left, right, fps: how to read the recording, see open_recording().
+    rig, format, left, right, times, fps, bits, pair_tolerance_s: how to read the recording, see open_recording().
     threads: None is all cores.
     max_frames: number of stereo frames to process; 0: all.
     speed: pace of a replay or a simulation.
@@ -133,7 +138,7 @@ def run(
     sensors: of cameras, a FIFO, created if there is none, whose lines are samples of the other sensors
         (docs/tutorials/rover.md).
     truth: ground truth for the report, a trajectory file or a recording; None: that of the recording.
-    report: also write the report page, `report/index.html`, of a recording.
+    report: also write the report page, `report/index.html`, of a recording. Where that fails, a warning says why.
     progress, frame: called after each frame. An exception that one raises ends the run; so does Ctrl-C. What was done
         is in the folder, and `resume=True` goes on.
 
@@ -141,15 +146,14 @@ def run(
 
     Raises Error, e.g. with the code `input` (no usable recording), `configuration` or `output`.
     """
+    reading = _core.OpenOptions(
+        rig=rig, format=format, left=left, right=right, times=times, fps=fps, bits=bits, pair_tolerance_s=pair_tolerance_s
+    )
     _core.run_into_folder(
         input,
         output,
         options,
-        rig=rig,
-        format=format,
-        left=left,
-        right=right,
-        fps=fps,
+        open=reading,
         threads=threads,
         max_frames=max_frames,
         resume=resume,
@@ -165,5 +169,8 @@ def run(
     if report:
         page = finished.path / "report" / "index.html"
         page.parent.mkdir(exist_ok=True)
-        _core.write_report(output, input, page, truth, threads)
+        try:
+            _core.write_report(output, input, reading, page, truth, threads)
+        except _core.Error as error:
+            logging.getLogger("spartan").warning("no report was written: %s", error)
     return finished

@@ -70,6 +70,9 @@ def test_a_pipeline_gives_what_the_run_has(drive, drive_run):
         assert result.stamp_ns == frame.stamp_ns
         motion, recorded = result.motion.previous_from_current, frame.motion.previous_from_current
         assert np.array_equal(motion.matrix(), recorded.matrix())
+    last = pipeline.finish_terrain()
+    assert last is None or last.disparity.shape == last.left.shape
+    assert pipeline.finish_terrain() is None
     while pipeline.finish_stop() is not None:
         pass
     assert pipeline.estimate().stamp_ns == results[-1].stamp_ns
@@ -245,6 +248,30 @@ def test_a_map_is_exported(stops_run, tmp_path):
     assert (tmp_path / "map.glb").read_bytes()[:4] == b"glTF"
     stops_run.export("tum", tmp_path / "poses.tum")
     assert len(spartan.Trajectory.load(str(tmp_path / "poses.tum"))) == len(stops_run.trajectory())
+
+
+def test_images_of_any_names(drive, tmp_path):
+    """The options of reading a recording also apply to its report and to the model of its images."""
+    import pycolmap
+
+    images = tmp_path / "images"
+    images.mkdir()
+    for side, name in (("image_0", "l"), ("image_1", "r")):
+        for path in (drive / side).glob("*.png"):
+            shutil.copy(path, images / f"{name}{path.name}")
+    reading = {"left": "l*.png", "right": "r*.png", "fps": 10, "rig": drive / "calib.txt"}
+    run = spartan.run(images, tmp_path / "run", max_frames=4, report=True, **reading)
+    assert (run.path / "report" / "index.html").stat().st_size > 10000
+    with pytest.raises(spartan.Error):
+        run.export("colmap", tmp_path / "none", recording=images)
+    run.export("colmap", tmp_path / "model", recording=spartan.open_recording(images, **reading))
+    assert pycolmap.Reconstruction(tmp_path / "model" / "sparse" / "0").num_images() == 4
+
+
+def test_a_report_that_fails_does_not_fail_the_run(drive, tmp_path, caplog):
+    run = spartan.run(drive, tmp_path / "run", max_frames=2, report=True, truth=tmp_path / "none.txt")
+    assert len(run.frames) == 2
+    assert "no report was written" in caplog.text and "none.txt" in caplog.text
 
 
 @pytest.mark.parametrize("kind", ["odometry", "localization"])

@@ -1,5 +1,6 @@
 #include "program/live_input.h"
 
+#include "program/interrupt.h"
 #include "program/simulation.h"
 #include "program/simulation_plan.h"
 
@@ -32,6 +33,7 @@ Result<std::unique_ptr<SampleStream>> open_live_input(const Context& context, co
   if (!scenario) {
     LiveOptions options = arguments.options;
     options.log = context.log;
+    options.should_stop = interrupted;
     return open_live_stream(address, open, options);
   }
   if (!arguments.options.sensors.empty())

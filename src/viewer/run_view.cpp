@@ -161,8 +161,7 @@ Status RunView::open_recordings() {
     recordings_.push_back(std::move(*opened));
   }
   if (imager_) return {};
-  const std::string masks = fs::path(recordings_.front()->info().rig_source).parent_path().string();
-  auto imager = Imager::create(rig_, options_.imaging, ThreadPool(1), masks);
+  auto imager = Imager::create(rig_, options_.imaging, ThreadPool(1), folder_.path);
   if (!imager) return failure(imager);
   imager_ = std::move(*imager);
   return {};

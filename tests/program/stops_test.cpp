@@ -15,6 +15,7 @@
 #include "program.h"
 #include "run_results.h"
 #include "spartan/camera/recording.h"
+#include "spartan/rig/rig.h"
 #include "spartan/slam/tile_store.h"
 #include "spartan/storage/database.h"
 #include "spartan/storage/geotiff.h"
@@ -129,6 +130,27 @@ TEST_F(Stops, ARunInterruptedAfterAnySampleEndsAsIfItWasNot) {
     run_until(output, samples + 1, true);
     EXPECT_EQ(byte_stable_content(path(output)), undisturbed) << last << " samples";
   }
+}
+
+TEST_F(Stops, SelfMasksAreStoredWithTheRun) {
+  std::string rig = testing::content_of(path("rec/rig.yaml"));
+  const std::size_t key = rig.find("size_px: [96, 72]");
+  ASSERT_NE(key, std::string::npos) << rig;
+  const std::size_t line = rig.rfind('\n', key) + 1;
+  rig.insert(line, std::string(key - line, ' ') + "self_mask: ../rover.pgm\n");
+  std::ofstream(path("rec/rig.yaml")) << rig;
+  EXPECT_NE(run("none", {"--max-frames", "2"}).exit_code, 0) << "the mask is missing";
+  std::ofstream(path("rover.pgm")) << "P5 96 72 255\n" << std::string(96 * 72, '\xff');
+  ASSERT_TRUE(finished(run("out", {"--max-frames", "2"})));
+  const Rig stored = read_rig_yaml(path("out/rig.yaml")).value();
+  const auto masked = std::find_if(stored.cameras.begin(), stored.cameras.end(),
+                                   [](const Camera& camera) { return !camera.self_mask.empty(); });
+  ASSERT_NE(masked, stored.cameras.end());
+  EXPECT_EQ(masked->self_mask, "masks/" + masked->name + ".pgm");
+  EXPECT_EQ(testing::content_of(path("out/" + masked->self_mask)), testing::content_of(path("rover.pgm")));
+  const ProgramResult model =
+      run_program({"export", path("out"), "--format", "colmap", "-o", path("model"), "--recording", path("rec")});
+  EXPECT_EQ(model.exit_code, 0) << model.err;
 }
 
 TEST_F(Stops, ArePartOfTheReport) {

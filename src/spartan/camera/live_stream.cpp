@@ -29,6 +29,7 @@ StreamResult open_cameras(const std::string& address, const std::string& rig_fil
   info.name = std::filesystem::path(rig_file).stem().string();
   internal::CameraStreamOptions camera_options;
   camera_options.pair_tolerance_s = open.pair_tolerance_s;
+  camera_options.should_stop = options.should_stop;
   std::unique_ptr<internal::SensorLineReader> lines;
   if (!options.sensors.empty()) {
     auto opened =

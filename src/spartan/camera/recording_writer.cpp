@@ -176,7 +176,7 @@ struct RecordingWriter::State {
                   fmt::format("does not come after the previous stamp, {} s", to_decimal_seconds(found->second)));
   }
 
-  Status check(const StereoFrame& frame) const {
+  Status check(const StereoFrame& frame, bool partial) const {
     const StereoPair* pair = rig.find_pair(frame.pair);
     if (!pair) return failure(ErrorCode::input, "the rig has no pair '" + frame.pair + "'", folder);
     if (Status s = check_stamp(frame.pair, frame.left_stamp); !s) return s;
@@ -184,10 +184,11 @@ struct RecordingWriter::State {
     if (!all_finite({frame.pan_rad, frame.tilt_rad, frame.exposure_us, frame.gain}))
       return reject(frame.pair, frame.left_stamp, "has an angle, exposure or gain that is not finite");
     for (const auto& [image, camera] : {std::pair{&frame.left, &pair->left}, std::pair{&frame.right, &pair->right}}) {
+      if (partial && image->empty()) continue;
       const std::string why = format_mismatch(*image, *rig.find_camera(*camera));
       if (!why.empty()) return reject("image of '" + *camera + "'", frame.left_stamp, why);
     }
-    if (frame.left.format().bits != frame.right.format().bits)
+    if (!partial && frame.left.format().bits != frame.right.format().bits)
       return reject(frame.pair, frame.left_stamp, "has left and right images of different bit depth");
     return {};
   }
@@ -318,18 +319,31 @@ Result<bool> RecordingWriter::reuse_frame(const std::string& pair, Stamp left_st
 }
 
 Status RecordingWriter::add(const StereoFrame& frame) {
-  if (Status s = state_->check(frame); !s) return s;
+  if (Status s = state_->check(frame, false); !s) return s;
+  return add_images(frame);
+}
+
+Status RecordingWriter::add_partial(const StereoFrame& frame) {
+  if (Status s = state_->check(frame, true); !s) return s;
+  if (frame.left.empty() == frame.right.empty())
+    return state_->reject(frame.pair, frame.left_stamp, "has not one image");
+  return add_images(frame);
+}
+
+// Those that are not empty.
+Status RecordingWriter::add_images(const StereoFrame& frame) {
   const std::string stem = fmt::format("images/{}/{}", frame.pair, frame.left_stamp.ns);
   const char* const extension = state_->images == ImageFiles::png ? ".png" : ".pnm";
   const std::string left = stem + "_left" + extension, right = stem + "_right" + extension;
   for (const auto& [path, image] : {std::pair{&left, &frame.left}, std::pair{&right, &frame.right}}) {
+    if (image->empty()) continue;
     if (Status s = state_->write(state_->folder + "/" + *path, *image); !s) return s;
   }
   state_->last[frame.pair] = frame.left_stamp;
-  const std::string row =
-      fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", frame.frame_id, frame.position_id, frame.pair,
-                  frame.left_stamp.ns, frame.right_stamp.ns, left, right, to_degrees(frame.pan_rad),
-                  to_degrees(frame.tilt_rad), frame.exposure_us, frame.gain, frame.left.format().bits);
+  const std::string row = fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}", frame.frame_id, frame.position_id,
+                                      frame.pair, frame.left_stamp.ns, frame.right_stamp.ns, left, right,
+                                      to_degrees(frame.pan_rad), to_degrees(frame.tilt_rad), frame.exposure_us,
+                                      frame.gain, (frame.left.empty() ? frame.right : frame.left).format().bits);
   if (state_->batched) {
     state_->unlisted.push_back(row);
     return {};

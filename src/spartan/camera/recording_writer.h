@@ -57,6 +57,8 @@ class RecordingWriter {
   ~RecordingWriter();
 
   Status add(const StereoFrame& frame);
+  /// A frame of which one image is there; the other one is empty, and its file is missing in the recording.
+  Status add_partial(const StereoFrame& frame);
   /// Reuses a complete frame of the resumed recording instead of writing it; false where it is absent or incomplete.
   Result<bool> reuse_frame(const std::string& pair, Stamp left_stamp);
   Status add(const ImuSample& sample);
@@ -79,6 +81,7 @@ class RecordingWriter {
  private:
   struct State;
   explicit RecordingWriter(std::unique_ptr<State> state);
+  Status add_images(const StereoFrame& frame);
   static Result<RecordingWriter> open(const std::string& folder, const Rig& nominal_rig,
                                       const RecordingOptions& options, std::map<std::string, std::string> previous_rows,
                                       FolderLock lock);

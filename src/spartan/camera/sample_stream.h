@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -152,7 +153,9 @@ class SampleStream {
   /// The pan-tilt unit behind the stream; null where there is none. Borrowed.
   virtual PanTiltControl* pan_tilt() { return nullptr; }
 
-  /// Before the first call of read(): a stream that can begin anywhere begins after this stamp.
+  /// Whether the same samples come again in another run, as those of a recording. Then start_after() has an effect.
+  virtual bool is_repeatable() const { return false; }
+  /// Before the first call of read(): it begins after this stamp.
   virtual void start_after(Stamp /*stamp*/) {}
 
   /// Number of frames of a pair that can be had before the first call of read(), for what is chosen by images: all
@@ -173,6 +176,7 @@ class StreamDecorator : public SampleStream {
   std::vector<CameraPairReport> camera_reports() const override { return behind_.camera_reports(); }
   CameraControl* control() override { return behind_.control(); }
   PanTiltControl* pan_tilt() override { return behind_.pan_tilt(); }
+  bool is_repeatable() const override { return behind_.is_repeatable(); }
   void start_after(Stamp stamp) override { behind_.start_after(stamp); }
   std::size_t previews(const std::string& pair) const override { return behind_.previews(pair); }
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override {
@@ -195,6 +199,7 @@ struct LiveOptions {
   /// Of cameras: path of a FIFO, created if there is none, from which samples of the other sensors are read
   /// (docs/reference/recording.md, sensor lines); empty: there are none.
   std::string sensors = {};
+  std::function<bool()> should_stop = {};  ///< asked while cameras are waited for; empty: never
 };
 
 /// Whether an input is the address of a live stream ("replay:FOLDER") and not the folder of a recording.

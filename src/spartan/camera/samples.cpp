@@ -42,4 +42,19 @@ std::string source_of(const Sample& sample) {
   return std::holds_alternative<CompassSample>(sample) ? ":compass" : ":inclinometer";
 }
 
+void move_stamps(Sample& sample, std::int64_t by_ns) {
+  const auto move_frame = [&](StereoFrame& frame) {
+    frame.left_stamp.ns += by_ns;
+    frame.right_stamp.ns += by_ns;
+  };
+  if (auto* frame = std::get_if<StereoFrame>(&sample)) return move_frame(*frame);
+  if (auto* missing = std::get_if<MissingFrame>(&sample); missing != nullptr && missing->partial)
+    move_frame(*missing->partial);
+  std::visit(
+      [&](auto& other) {
+        if constexpr (requires { other.stamp; }) other.stamp.ns += by_ns;
+      },
+      sample);
+}
+
 }  // namespace spartan

@@ -1,12 +1,15 @@
 #include <condition_variable>
 #include <deque>
+#include <filesystem>
 #include <mutex>
 #include <new>
 #include <thread>
 #include <utility>
 #include <variant>
 
+#include "spartan/camera/internal/self_masks.h"
 #include "spartan/camera/recording_writer.h"
+#include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
 
 namespace spartan {
@@ -16,6 +19,8 @@ constexpr std::chrono::seconds kSyncEvery{1};
 
 std::size_t bytes_of(const Sample& sample) {
   const auto* frame = std::get_if<StereoFrame>(&sample);
+  const auto* missing = std::get_if<MissingFrame>(&sample);
+  if (missing != nullptr && missing->partial) frame = &*missing->partial;
   return frame != nullptr ? frame->left.bytes() + frame->right.bytes() : 0;
 }
 
@@ -46,6 +51,10 @@ Result<std::unique_ptr<StreamRecorder>> StreamRecorder::create(const std::string
   rig.imu.body_from_imu = Pose::from_translation(rig.imu.body_from_imu.translation());
   auto writer = RecordingWriter::create_batched(folder, rig, recording_options_of(info), images);
   if (!writer) return failure(writer);
+  const auto stored =
+      internal::with_self_masks_in(folder, rig, std::filesystem::path(info.rig_source).parent_path().string());
+  if (!stored) return failure(stored);
+  if (Status s = write_file_atomically(folder + "/rig.yaml", to_rig_yaml(*stored)); !s) return failure(s);
   return std::unique_ptr<StreamRecorder>(new StreamRecorder(std::make_unique<State>(std::move(*writer))));
 }
 
@@ -58,7 +67,8 @@ StreamRecorder::~StreamRecorder() {
 }
 
 void StreamRecorder::add(const Sample& sample) {
-  if (std::holds_alternative<MissingFrame>(sample)) return;
+  const auto* missing = std::get_if<MissingFrame>(&sample);
+  if (missing != nullptr && !missing->partial) return;
   const std::size_t bytes = bytes_of(sample);
   {
     const std::lock_guard lock(state_->mutex);
@@ -145,7 +155,8 @@ void StreamRecorder::State::run() {
 Status StreamRecorder::State::write_all(std::deque<Sample> samples) {
   for (; !samples.empty(); samples.pop_front()) {
     Status written = write(samples.front());
-    const bool is_frame = std::holds_alternative<StereoFrame>(samples.front());
+    const Sample& sample = samples.front();
+    const bool is_frame = std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);
     const std::lock_guard lock(mutex);
     bytes -= bytes_of(samples.front());
     if (written) {
@@ -163,7 +174,7 @@ Status StreamRecorder::State::write(const Sample& sample) {
   return std::visit(
       [this](const auto& s) -> Status {
         if constexpr (std::is_same_v<std::decay_t<decltype(s)>, MissingFrame>) {
-          return {};
+          return writer.add_partial(*s.partial);
         } else {
           return writer.add(s);
         }

@@ -53,6 +53,21 @@ std::size_t listed_frames(const std::string& folder) {
   return static_cast<std::size_t>(std::count(table.begin(), table.end(), '\n')) - 1;
 }
 
+TEST(StreamRecorder, StoresSelfMasksWithTheRecording) {
+  const TemporaryFolder folder;
+  StreamInfo info = tiny_stream();
+  info.rig_source = folder.path() + "/rig.yaml";
+  info.rig.cameras[0].self_mask = "rover.pgm";
+  const std::string path = folder.path() + "/recording";
+  EXPECT_EQ(StreamRecorder::create(path, info, ImageFiles::pnm).error().code, ErrorCode::configuration);
+  static_cast<void>(folder.write("rover.pgm", "P5 1 1 255\n\xff"));
+  auto recorder = StreamRecorder::create(folder.path() + "/again", info, ImageFiles::pnm);
+  ASSERT_TRUE(recorder) << recorder.error().message();
+  ASSERT_TRUE((*recorder)->finish());
+  const Rig stored = read_rig_yaml(folder.path() + "/again/rig.yaml").value();
+  EXPECT_EQ(read_file(folder.path() + "/again/" + stored.cameras[0].self_mask).value(), "P5 1 1 255\n\xff");
+}
+
 class StreamRecorderTest : public ::testing::TestWithParam<ImageFiles> {
  protected:
   std::string path() const { return folder_.path() + "/recording"; }
@@ -85,6 +100,30 @@ TEST_P(StreamRecorderTest, RecordsWhatCanBeReadBack) {
     EXPECT_TRUE(testing::same_image(read.left, expected.left));
     EXPECT_TRUE(testing::same_image(read.right, expected.right));
   }
+}
+
+TEST_P(StreamRecorderTest, FramesOfOneImageAreReadBackAsSuch) {
+  {
+    const auto recorder = StreamRecorder::create(path(), tiny_stream(), GetParam()).value();
+    recorder->add(tiny_frame(0));
+    MissingFrame missing;
+    missing.pair = "stereo";
+    missing.partial = tiny_frame(1);
+    missing.stamp = missing.partial->left_stamp;
+    missing.partial->left = FrameImage();
+    recorder->add(missing);
+    ASSERT_TRUE(recorder->finish());
+    EXPECT_EQ(recorder->progress().frames, 2);
+  }
+  const auto recording = open_recording(path()).value();
+  ASSERT_TRUE(std::holds_alternative<StereoFrame>(*recording->next().value()));
+  const Sample second = *recording->next().value();
+  const auto* missing = std::get_if<MissingFrame>(&second);
+  ASSERT_NE(missing, nullptr);
+  ASSERT_TRUE(missing->partial);
+  EXPECT_EQ(missing->stamp, tiny_frame(1).left_stamp);
+  EXPECT_TRUE(missing->partial->left.empty());
+  EXPECT_TRUE(testing::same_image(missing->partial->right, tiny_frame(1).right));
 }
 
 INSTANTIATE_TEST_SUITE_P(ImageFiles, StreamRecorderTest, ::testing::Values(ImageFiles::png, ImageFiles::pnm),

@@ -3,6 +3,7 @@
 #include <spdlog/logger.h>
 #include <spdlog/sinks/base_sink.h>
 #include <spdlog/sinks/basic_file_sink.h>
+#include <spdlog/sinks/dist_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 
 #include <cstdlib>
@@ -59,13 +60,23 @@ class FunctionSink final : public spdlog::sinks::base_sink<std::mutex> {
 }  // namespace
 
 struct Log::Sink {
-  explicit Sink(std::vector<spdlog::sink_ptr> sinks) : logger("spartan", sinks.begin(), sinks.end()) {
+  explicit Sink(std::vector<spdlog::sink_ptr> first)
+      : sinks(std::make_shared<spdlog::sinks::dist_sink_mt>(std::move(first))), logger("spartan", sinks) {
     logger.set_level(spdlog::level::debug);
     logger.flush_on(spdlog::level::info);
     logger.set_error_handler([](const std::string&) {});  // a full disk must not print an error for each message
   }
+  std::shared_ptr<spdlog::sinks::dist_sink_mt> sinks;
   spdlog::logger logger;
 };
+
+struct LogFile::File {
+  spdlog::sink_ptr sink;
+};
+
+LogFile::~LogFile() {
+  if (file_) sink_->sinks->remove_sink(file_->sink);
+}
 
 Log Log::to_terminal(LogLevel level) {
   Log log;
@@ -80,20 +91,20 @@ Log Log::to_function(std::function<void(LogLevel, std::string_view)> function) {
   return log;
 }
 
-Log Log::with_file(const std::string& path) const {
-  std::vector<spdlog::sink_ptr> sinks;
-  if (sink_) sinks = sink_->logger.sinks();
+LogFile Log::attach_file(const std::string& path) {
+  if (!sink_) sink_ = std::make_shared<Sink>(std::vector<spdlog::sink_ptr>());
+  LogFile attached;
   try {
     auto file = std::make_shared<spdlog::sinks::basic_file_sink_mt>(path);
     file->set_level(spdlog::level::info);
     file->set_pattern("%Y-%m-%dT%H:%M:%S.%e %l: %v");
-    sinks.push_back(std::move(file));
+    attached.file_ = std::make_shared<LogFile::File>(LogFile::File{file});
+    attached.sink_ = sink_;
+    sink_->sinks->add_sink(std::move(file));
   } catch (const spdlog::spdlog_ex&) {
     // As documented, the other sinks are kept.
   }
-  Log log;
-  log.sink_ = std::make_shared<Sink>(std::move(sinks));
-  return log;
+  return attached;
 }
 
 void Log::write(LogLevel level, std::string_view text) const {

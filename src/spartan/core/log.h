@@ -10,6 +10,8 @@ namespace spartan {
 
 enum class LogLevel { debug, info, warning, error, off };
 
+class LogFile;
+
 /// A logger that is passed by value; copies share their sinks. A default-constructed Log discards all messages.
 class Log {
  public:
@@ -18,9 +20,9 @@ class Log {
   static Log to_terminal(LogLevel level);
   /// All messages to a function, which may be called by any thread, one call at a time.
   static Log to_function(std::function<void(LogLevel, std::string_view)> function);
-  /// This log with an additional file sink (appended, level `info` and above). If the file cannot be opened, the result
-  /// equals this log.
-  Log with_file(const std::string& path) const;
+  /// Messages of this log and of all its copies go to a file as well (appended, level `info` and above), as long as the
+  /// result exists. Nothing changes if the file cannot be opened.
+  LogFile attach_file(const std::string& path);
 
   void debug(std::string_view text) const { write(LogLevel::debug, text); }
   void info(std::string_view text) const { write(LogLevel::info, text); }
@@ -28,9 +30,25 @@ class Log {
   void error(std::string_view text) const { write(LogLevel::error, text); }
 
  private:
+  friend class LogFile;
   struct Sink;
   void write(LogLevel level, std::string_view text) const;
   std::shared_ptr<Sink> sink_;
+};
+
+/// A file that is attached to a log.
+class LogFile {
+ public:
+  LogFile() = default;
+  ~LogFile();
+  LogFile(LogFile&&) = default;
+  LogFile& operator=(LogFile&&) = delete;
+
+ private:
+  friend class Log;
+  struct File;
+  std::shared_ptr<Log::Sink> sink_;
+  std::shared_ptr<File> file_;
 };
 
 }  // namespace spartan

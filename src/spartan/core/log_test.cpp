@@ -23,8 +23,9 @@ TEST(Log, TheFileReceivesLevelInfoAndAbove) {
   const std::string path = folder.write("log.txt", "earlier\n");
   ::testing::internal::CaptureStderr();
   {
-    const Log log = Log::to_terminal(LogLevel::error).with_file(path);
+    Log log = Log::to_terminal(LogLevel::error);
     const Log copy = log;  // NOLINT(performance-unnecessary-copy-initialization): that copies share the file is tested
+    const LogFile attached = log.attach_file(path);
     log.debug("a detail");
     copy.info("a {brace} is no format");
     log.warning("a warning");
@@ -43,8 +44,23 @@ TEST(Log, TheFileReceivesLevelInfoAndAbove) {
 
 TEST(Log, AFileThatCannotBeOpenedIsIgnored) {
   ::testing::internal::CaptureStderr();
-  Log::to_terminal(LogLevel::info).with_file("/proc/none/log.txt").info("still printed");
+  Log log = Log::to_terminal(LogLevel::info);
+  const LogFile attached = log.attach_file("/proc/none/log.txt");
+  log.info("still printed");
   EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("still printed"));
+}
+
+TEST(Log, AFileIsWrittenWhileItIsAttached) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder.path() + "/log.txt";
+  Log log;
+  {
+    const LogFile attached = log.attach_file(path);
+    log.info("the first run");
+  }
+  log.info("another run");
+  EXPECT_THAT(testing::content_of(path), HasSubstr("the first run"));
+  EXPECT_THAT(testing::content_of(path), Not(HasSubstr("another run")));
 }
 
 }  // namespace

@@ -119,8 +119,7 @@ Result<int> export_colmap(const std::string& run_folder, Recording& recording, s
   if (!options) return failure(options);
   const auto rig = read_rig_yaml(folder.rig());
   if (!rig) return failure(rig);
-  const std::string mask_folder = fs::path(recording.info().rig_source).parent_path().string();
-  auto imager = Imager::create(*rig, options->imaging, workers, mask_folder);
+  auto imager = Imager::create(*rig, options->imaging, workers, folder.path);
   if (!imager) return failure(imager);
   if (Status s = make_folders(path); !s) return failure(s);
   ColmapModel model;

@@ -144,10 +144,12 @@ std::optional<TerrainView> Pipeline::State::take_ready_terrain() {
 void Pipeline::State::update_terrain(const RectifiedPair& rectified, const DisparityImage& dense) {
   if (!computes_terrain || terrain_stage.is_pending() || !terrain_stage.is_due(distance_m)) return;
   if (!has_both_images(rectified)) return;
+  // In the world of the maps.
+  const Pose at = localized_at(rectified.stamp).world_from_body.pose * rectified.body_from_left;
   if (dense.disparity.empty()) {
-    terrain_stage.begin(rectified, world_from_left, distance_m, pair.nearest_m, disparity_computer, back_end);
+    terrain_stage.begin(rectified, at, distance_m, pair.nearest_m, disparity_computer, back_end);
   } else {
-    terrain_stage.begin(rectified, world_from_left, distance_m, dense);
+    terrain_stage.begin(rectified, at, distance_m, dense);
   }
 }
 

@@ -31,7 +31,7 @@ struct TerrainView {
   Image<std::uint8_t> left;  ///< rectified
   Image<float> disparity;    ///< px, NaN unknown
   Image<float> sigma;        ///< standard deviation of the disparity, px
-  Pose world_from_left;      ///< rectified left optical frame
+  Pose world_from_left;      ///< rectified left optical frame; world of the localization, as of the maps
 };
 
 /// Whether frames wait for the back end, which makes terrain views and maps.

@@ -14,9 +14,11 @@
 #include <vector>
 
 #include "spartan/calibration_io/calibration_files.h"
+#include "spartan/camera/internal/self_masks.h"
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"
+#include "spartan/system/internal/continued_stream.h"
 #include "spartan/system/internal/exposure_stage.h"
 #include "spartan/system/internal/panorama.h"
 #include "spartan/system/internal/pipeline_state.h"
@@ -283,7 +285,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   auto prepared = prepare_run_folder(folder, request.resume);
   if (!prepared) return failure(prepared);
   RunHooks hooks = given_hooks;
-  hooks.log = given_hooks.log.with_file(folder.log());
+  const LogFile log_file = hooks.log.attach_file(folder.log());  // also of what cameras and the pan-tilt unit say
   if (source.recording) report_sequence(source.recording->info(), hooks.log);
   for (const std::string& sentence : setup->sentences) hooks.log.info(sentence);
   if (options.odometry_only) hooks.log.info("odometry only: no localization, no maps, no SLAM, no terrain");
@@ -299,7 +301,10 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
-  if (Status s = write_file_atomically(folder.rig(), identity.rig); !s) return failure(s);
+  const auto stored_rig =
+      with_self_masks_in(folder.path, rig, std::filesystem::path(info.rig_source).parent_path().string());
+  if (!stored_rig) return failure(stored_rig);
+  if (Status s = write_file_atomically(folder.rig(), to_rig_yaml(*stored_rig)); !s) return failure(s);
 
   auto recorder = RunRecorder::create(std::move(*store), folder, options, source.pace());
   if (!recorder) return failure(recorder);
@@ -371,7 +376,10 @@ Result<std::unique_ptr<Panorama>> panorama_of(SampleStream& stream, PanTiltContr
                    "name one with --pan-tilt");
   }
   if (unit == nullptr || (!wanted && !hooks.command)) return nullptr;
-  return Panorama::create(stream.info().rig, request.options.panorama, *unit, stream.control(), hooks);
+  const Rig& rig = stream.info().rig;
+  const StereoPair* const odometry = odometry_pair_of(rig, request.options);
+  return Panorama::create(rig, odometry == nullptr ? "" : odometry->name, request.options.panorama, *unit,
+                          stream.control(), hooks);
 }
 
 // The error of the unit adds to that of its calibration in the variance of the maps.
@@ -417,11 +425,12 @@ Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, con
     auto unit = request.pan_tilt.empty() ? std::unique_ptr<PanTiltControl>() : open_pan_tilt(request.pan_tilt);
     if (!unit) return failure(unit);
     if (*unit) wanted.options = with_unit_error(request.options, stream.info().rig, **unit);
-    auto panorama = panorama_of(stream, unit->get(), wanted, hooks);
+    ContinuedStream continued(stream, hooks.log);
+    auto panorama = panorama_of(continued, unit->get(), wanted, hooks);
     if (!panorama) return failure(panorama);
     std::optional<PanoramaStream> labelled;
-    if (*panorama) labelled.emplace(stream, **panorama);
-    SampleStream& samples = labelled ? *labelled : stream;
+    if (*panorama) labelled.emplace(continued, **panorama);
+    SampleStream& samples = labelled ? static_cast<SampleStream&>(*labelled) : continued;
     QueuedStream queue(samples, odometry ? odometry->name : "", kQueueBytes);
     return with_store(run_source({samples, nullptr, &queue, panorama->get()}, start, wanted, hooks),
                       RunFolder{request.output}.store());

@@ -155,26 +155,20 @@ Result<std::optional<Sample>> ReplayStream::fetch_any() {
 }
 
 void ReplayStream::shift(Sample& sample) const {
-  const auto move_frame = [&](StereoFrame& frame) {
-    frame.left_stamp.ns += offset_.stamp.ns;
-    frame.right_stamp.ns += offset_.stamp.ns;
+  move_stamps(sample, offset_.stamp.ns);
+  const auto number = [&](StereoFrame& frame) {
     frame.frame_id += offset_.frame_id;
     if (frame.position_id >= 0) frame.position_id += offset_.position_id;
   };
-  if (auto* frame = std::get_if<StereoFrame>(&sample)) move_frame(*frame);
+  if (auto* frame = std::get_if<StereoFrame>(&sample)) number(*frame);
   if (auto* missing = std::get_if<MissingFrame>(&sample)) {
-    missing->stamp.ns += offset_.stamp.ns;
     missing->frame_id += offset_.frame_id;
-    if (missing->partial) move_frame(*missing->partial);
+    if (missing->partial) number(*missing->partial);
   }
-  if (auto* imu = std::get_if<ImuSample>(&sample)) imu->stamp.ns += offset_.stamp.ns;
   if (auto* wheels = std::get_if<WheelSample>(&sample)) {
-    wheels->stamp.ns += offset_.stamp.ns;
     wheels->left_m += offset_.left_m;
     wheels->right_m += offset_.right_m;
   }
-  if (auto* compass = std::get_if<CompassSample>(&sample)) compass->stamp.ns += offset_.stamp.ns;
-  if (auto* inclinometer = std::get_if<InclinometerSample>(&sample)) inclinometer->stamp.ns += offset_.stamp.ns;
 }
 
 void ReplayStream::note(const Sample& sample) {

@@ -42,6 +42,7 @@ class ReplayStream : public SampleStream {
 
   const StreamInfo& info() const override { return info_; }
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
+  bool is_repeatable() const override { return true; }
   void start_after(Stamp stamp) override { start_after_ = stamp; }
   DiscardedSamples discarded() const override;
   /// Only before the first call of read().

@@ -29,6 +29,7 @@ class LiveSimulation : public SampleStream, public CameraControl, public PanTilt
   CameraControl* control() override { return this; }
   /// Null where no camera of the rig is on a pan-tilt unit.
   PanTiltControl* pan_tilt() override;
+  bool is_repeatable() const override { return true; }
   void start_after(Stamp stamp) override { start_after_ = stamp; }
   /// The first frame of each pair.
   std::size_t previews(const std::string& pair) const override { return first_frame(pair) ? 1 : 0; }

@@ -20,24 +20,31 @@ constexpr int kAttempts = 3;  // of a motion, and of a frame
 
 }  // namespace
 
-Result<std::unique_ptr<Panorama>> Panorama::create(const Rig& rig, const PanoramaOptions& options, PanTiltControl& unit,
+Result<std::unique_ptr<Panorama>> Panorama::create(const Rig& rig, const std::string& odometry_pair,
+                                                   const PanoramaOptions& options, PanTiltControl& unit,
                                                    CameraControl* cameras, const RunHooks& hooks) {
-  std::unique_ptr<Panorama> panorama(new Panorama(rig, options, unit, cameras, hooks));
+  std::unique_ptr<Panorama> panorama(new Panorama(rig, odometry_pair, options, unit, cameras, hooks));
   if (panorama->pairs_.empty()) {
-    return failure(ErrorCode::configuration, "has no stereo pair on a pan-tilt unit, which a panorama needs", rig.name,
+    return failure(ErrorCode::configuration,
+                   "has no stereo pair besides the odometry's on a pan-tilt unit, which a panorama needs", rig.name,
                    "set mount of its cameras, or omit --panorama-every and --control");
   }
   return panorama;
 }
 
-Panorama::Panorama(const Rig& rig, const PanoramaOptions& options, PanTiltControl& unit, CameraControl* cameras,
-                   const RunHooks& hooks)
+Panorama::Panorama(const Rig& rig, const std::string& odometry_pair, const PanoramaOptions& options,
+                   PanTiltControl& unit, CameraControl* cameras, const RunHooks& hooks)
     : options_(options), unit_(unit), cameras_(cameras), hooks_(hooks) {
   if (rig.pan_tilt_units.empty()) return;
   const PanTiltUnit& mast = rig.pan_tilt_units.front();
   rest_ = {mast.rest_pan_rad, mast.rest_tilt_rad};
   for (const StereoPair& pair : rig.pairs) {
-    if (rig.find_camera(pair.left)->mount == mast.name) pairs_.insert(pair.name);
+    if (rig.find_camera(pair.left)->mount != mast.name) continue;
+    if (pair.name == odometry_pair) {
+      odometry_pair_ = odometry_pair;
+    } else {
+      pairs_.insert(pair.name);
+    }
   }
   if (!pairs_.empty()) thread_ = std::thread([this] { run(); });
 }
@@ -75,6 +82,11 @@ bool Panorama::label(StereoFrame& frame) {
   const std::lock_guard lock(mutex_);
   latest_ = std::max(latest_, frame.left_stamp);
   frame.position_id = phase_ == Phase::idle || rover_moved_ ? -1 : position_id_;
+  if (frame.pair == odometry_pair_) {
+    frame.pan_rad = rest_.pan_rad;
+    frame.tilt_rad = rest_.tilt_rad;
+    return phase_ == Phase::idle;
+  }
   if (!pairs_.contains(frame.pair)) return true;
   if (phase_ != Phase::taking || missing_.erase(frame.pair) == 0) return false;
   frame.pan_rad = angles_.pan_rad;

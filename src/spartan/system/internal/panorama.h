@@ -30,9 +30,11 @@ class Panorama {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `unit` and `cameras` (null: they take frames by themselves) are borrowed. Code `configuration`: no pair of the rig
-  /// is on its pan-tilt unit.
-  static Result<std::unique_ptr<Panorama>> create(const Rig& rig, const PanoramaOptions& options, PanTiltControl& unit,
+  /// `unit` and `cameras` (null: they take frames by themselves) are borrowed. The odometry takes no part in a
+  /// panorama: where its pair is on the unit, too, it has frames at the rest angles only. Code `configuration`: no
+  /// other pair of the rig is on its pan-tilt unit.
+  static Result<std::unique_ptr<Panorama>> create(const Rig& rig, const std::string& odometry_pair,
+                                                  const PanoramaOptions& options, PanTiltControl& unit,
                                                   CameraControl* cameras, const RunHooks& hooks);
   /// Ends a panorama that has begun.
   ~Panorama();
@@ -47,15 +49,15 @@ class Panorama {
     if constexpr (std::is_same_v<Motion, RoverMotion>) distance_m_ = motion.distance_m;
     update(motion.stamp);
   }
-  /// Gives a frame its stop, and one of the unit's cameras its angles. False: it was not taken for a panorama, or while
-  /// the unit moved.
+  /// Gives a frame its stop, and one of the unit's cameras its angles. False: it was not taken for a panorama, while
+  /// the unit moved, or, of the odometry's pair, during a panorama.
   bool label(StereoFrame& frame);
 
  private:
   enum class Phase { idle, moving, taking };
 
-  Panorama(const Rig& rig, const PanoramaOptions& options, PanTiltControl& unit, CameraControl* cameras,
-           const RunHooks& hooks);
+  Panorama(const Rig& rig, const std::string& odometry_pair, const PanoramaOptions& options, PanTiltControl& unit,
+           CameraControl* cameras, const RunHooks& hooks);
   void update(Stamp stamp);
   void run();
   void report(bool begins);
@@ -75,7 +77,8 @@ class Panorama {
   CameraControl* cameras_;
   RunHooks hooks_;
   PanTiltAngles rest_;
-  std::set<std::string> pairs_;  // on the unit
+  std::set<std::string> pairs_;  // on the unit, without the odometry's
+  std::string odometry_pair_;    // where it is on the unit
   StationaryCheck check_;
   double distance_m_ = 0;
 

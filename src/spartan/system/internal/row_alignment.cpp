@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <utility>
 
@@ -51,7 +52,8 @@ Result<AlignedRig> align_rows_of(SampleStream& source, const ThreadPool& workers
   AlignedRig result{source.info().rig, {}};
   ImagingOptions options;
   options.rectify = false;
-  auto imager = Imager::create(result.rig, options, workers);
+  const std::string masks = std::filesystem::path(source.info().rig_source).parent_path().string();
+  auto imager = Imager::create(result.rig, options, workers, masks);
   if (!imager) return failure(imager);
   std::vector<CorrectedPair> corrected;
   std::map<std::string, std::string> sentences;  // by pair

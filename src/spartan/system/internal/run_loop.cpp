@@ -316,11 +316,14 @@ Status RunLoop::record(RunResult result) {
   result.commit_now = far || (options.at_maps && result.stop);
   if (far) distance_committed_m_ = distance_m_;
   const std::chrono::duration<double> since = std::chrono::steady_clock::now() - last_checkpoint_;
-  const bool due = since.count() >= options.state_every_s && (recording_ || !recorder_->checkpoint_waits());
+  const double state_every_s =
+      can_be_read_again() ? options.state_every_s : std::min(options.state_every_s, options.every_s);
+  const bool due = since.count() >= state_every_s && (recording_ || !recorder_->checkpoint_waits());
   if (frames_ == 1 || due) add_checkpoint(result);
   Status status = recorder_->add(std::move(result));
   pipeline_.map_changes_stored(recorder_->maps_stored());
   report_disk();
+  report_recording();
   if (status && hooks_.progress) hooks_.progress(progress);
   return status;
 }
@@ -360,6 +363,22 @@ void RunLoop::report_disk() {
   }
 }
 
+// Whether a resumed run could process the frames since the last state again.
+bool RunLoop::can_be_read_again() const {
+  if (recording_ || repeatable_) return true;
+  return stream_recorder_ != nullptr && unrecorded_ == unrecorded_at_checkpoint_ && !recording_failed_;
+}
+
+void RunLoop::report_recording() {
+  if (stream_recorder_ == nullptr) return;
+  const RecorderProgress progress = stream_recorder_->progress();
+  if (!progress.status && !recording_failed_)
+    hooks_.log.error("the recording stops, the run goes on: " + progress.status.error().message());
+  if (progress.dropped > 0 && unrecorded_ == 0) hooks_.log.warning("frames are not recorded: the disk is too slow");
+  recording_failed_ = !progress.status;
+  unrecorded_ = progress.dropped + progress.rejected;
+}
+
 void RunLoop::report_estimate() {
   if (!hooks_.estimate) return;
   if (const auto estimate = pipeline_.estimate()) hooks_.estimate(*estimate);
@@ -367,6 +386,7 @@ void RunLoop::report_estimate() {
 
 void RunLoop::add_checkpoint(RunResult& result) {
   last_checkpoint_ = std::chrono::steady_clock::now();
+  unrecorded_at_checkpoint_ = unrecorded_;
   const std::uint64_t content = recording_ ? recording_->content_hash() : 0;
   result.checkpoint = RunStore::Checkpoint{pipeline_.save(), {samples_taken_, content, last_stamps_}, elapsed()};
   // The frames that the back end works on are read again from the recording.

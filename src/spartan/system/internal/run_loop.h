@@ -51,6 +51,7 @@ class RunLoop {
         recording_(stream.recording),
         resumed_stream_(stream.resumed),
         stream_recorder_(stream.recorder),
+        repeatable_(stream.samples.is_repeatable()),
         exposure_(stream.exposure),
         panorama_(stream.panorama),
         recorder_(std::move(recorder)),
@@ -101,6 +102,8 @@ class RunLoop {
   void add_checkpoint(RunResult& result);
   void report_estimate();
   void report_disk();
+  void report_recording();
+  bool can_be_read_again() const;
   std::vector<StageTime> take_stage_times();
 
   const RunRequest& request_;
@@ -109,6 +112,7 @@ class RunLoop {
   Recording* recording_;  // null: live
   ResumedStream* resumed_stream_;
   StreamRecorder* stream_recorder_;
+  bool repeatable_;  // SampleStream::is_repeatable()
   ExposureStage* exposure_;
   Panorama* panorama_;
   std::map<std::string, Stamp> last_stamps_;  // of a live stream, by source_of()
@@ -132,7 +136,8 @@ class RunLoop {
   std::chrono::steady_clock::time_point arrived_;  // of the sample that is processed
   LatencyRecord latencies_;
   std::map<std::string, Stamp> tested_;  // the latest innovation test of each sensor that is recorded
-  bool disk_failed_ = false;
+  bool disk_failed_ = false, recording_failed_ = false;
+  std::int64_t unrecorded_ = 0, unrecorded_at_checkpoint_ = 0;  // samples of the stream
   bool after_frame_ = true;  // nothing was processed since the last frame of the odometry pair
   std::optional<std::chrono::steady_clock::time_point> stopped_;
   bool catching_up_ = false;  // with what a resumed live run had recorded

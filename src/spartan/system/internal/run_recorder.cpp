@@ -174,7 +174,12 @@ Status RunRecorder::process(RunResult result) {
   if (batch_.empty()) oldest_ = std::chrono::steady_clock::now();
   batch_.push_back(std::move(result.step));
   const bool due = result.checkpoint || result.commit_now || std::chrono::steady_clock::now() >= commit_time();
-  if (result.checkpoint && result.before_checkpoint) result.before_checkpoint();
+  if (result.checkpoint && result.before_checkpoint) {
+    if (Status committed = commit({}, {}); !committed) return committed;  // frames do not wait for the recording
+    StageClock clock(CLOCK_THREAD_CPUTIME_ID);
+    clock.show_in(running_);
+    clock.measure("recording", [&] { result.before_checkpoint(); });
+  }
   return due ? commit(std::move(result.checkpoint), std::move(result.maps)) : Status();
 }
 

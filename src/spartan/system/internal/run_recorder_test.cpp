@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -209,6 +210,31 @@ TEST_F(RunRecorderTest, ReportsAnErrorOfTheDisk) {
   EXPECT_EQ(flushed.error().code, ErrorCode::output);
   EXPECT_FALSE(recorder->add(frame_result(2))) << "no result after it is written";
   EXPECT_EQ(committed_frames(), 1U);
+}
+
+// A recording that hangs.
+TEST_F(RunRecorderTest, FramesDoNotWaitForTheRecording) {
+  CommitOptions commit;
+  commit.every_s = 1000;
+  const auto recorder = open(commit, Pace::live);
+  std::atomic<bool> hangs = true;
+  RunResult result = frame_result(0);
+  result.checkpoint.emplace();
+  result.before_checkpoint = [&] {
+    while (hangs) std::this_thread::sleep_for(1ms);
+  };
+  ASSERT_TRUE(recorder->add(std::move(result)));
+  const auto until = std::chrono::steady_clock::now() + 20s;
+  std::string stage;
+  while (stage != "recording" && std::chrono::steady_clock::now() < until) {
+    std::this_thread::sleep_for(1ms);
+    const char* const running = recorder->running().stage();
+    stage = running == nullptr ? "" : running;
+  }
+  EXPECT_EQ(stage, "recording") << "for the watchdog";
+  EXPECT_EQ(committed_frames(), 1u);
+  hangs = false;
+  EXPECT_TRUE(recorder->flush());
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ using Clock = std::chrono::steady_clock;
 // From the start of the threads to the first trigger.
 constexpr std::chrono::milliseconds kFirstTrigger{50};
 // A camera without an image for so long, and whose partner has delivered so many alone, is silent.
+constexpr std::chrono::milliseconds kAskToStop{100};
 constexpr std::chrono::seconds kSilence{1};
 constexpr int kAloneInRow = 3;
 
@@ -44,7 +45,10 @@ Result<std::unique_ptr<CameraStream>> CameraStream::create(const StreamInfo& inf
                      info.rig_source);
     }
     if (!left) continue;
-    if (Status opened = stream->open_pair(pair, open); !opened) return failure(opened);
+    Status opened = stream->open_pair(pair, open);
+    if (opened) continue;
+    if (pair.for_odometry) return failure(opened);
+    log.error(fmt::format("pair {} is left out of this run: {}", pair.name, opened.error().message()));
   }
   if (stream->feeds_.empty()) {
     return failure(ErrorCode::configuration, "no camera has a driver", info.rig_source,
@@ -121,10 +125,15 @@ Status CameraStream::wait_for_previews() {
       if (frame != nullptr) previews_.try_emplace(frame->pair, *frame);
     }
     if (!waits()) samples_.clear();
-    const auto missing = std::find_if(feeds_.begin(), feeds_.end(),
-                                      [&](const auto& feed) { return !previews_.contains(feed->pair.name); });
+    const auto lacks_preview = [&](const auto& feed) { return !previews_.contains(feed->pair.name); };
+    auto missing = std::find_if(feeds_.begin(), feeds_.end(), lacks_preview);
     if (missing == feeds_.end()) return {};
+    if (options_.should_stop && options_.should_stop())
+      return failure(ErrorCode::interrupted, "the first frames were not waited for", info_.path);
     if (Clock::now() >= until || all_ended()) {
+      missing = std::find_if(feeds_.begin(), feeds_.end(),
+                             [&](const auto& feed) { return lacks_preview(feed) && feed->pair.for_odometry; });
+      if (missing == feeds_.end()) return report_silent_pairs();
       const auto& sources = (*missing)->sources;
       const CameraReport left = sources.front()->camera_report(0),
                          right = sources.back()->camera_report(sources.size() == 1 ? 1 : 0);
@@ -136,8 +145,16 @@ Status CameraStream::wait_for_previews() {
                      "check that the cameras run and take their images together; --pair-tolerance allows larger "
                      "differences of their times");
     }
-    changed_.wait_until(lock, next_timeout(until));
+    changed_.wait_until(lock, std::min(next_timeout(until), Clock::now() + kAskToStop));
   }
+}
+
+Status CameraStream::report_silent_pairs() const {
+  for (const auto& feed : feeds_) {
+    if (!previews_.contains(feed->pair.name))
+      log_.error(fmt::format("pair {} delivers no frame; the run begins without it", feed->pair.name));
+  }
+  return {};
 }
 
 bool CameraStream::all_ended() const {

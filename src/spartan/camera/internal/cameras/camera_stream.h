@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -26,14 +27,17 @@ struct CameraStreamOptions {
   std::chrono::milliseconds pair_wait{200};     ///< for the other image of a pair, and for that of a trigger
   std::chrono::milliseconds first_wait{10000};  ///< for the first frame of each pair
   HostClock clock{};                            ///< of the stamps
+  std::function<bool()> should_stop{};          ///< asked while the first frames are waited for; empty: never
 };
 
 /// The pairs of a rig whose cameras have drivers. An image without a partner, and a trigger without an image, come as
 /// MissingFrame with the reason. Ends where all devices have ended; a device that is lost is opened again and again.
 class CameraStream : public SampleStream, public CameraControl {
  public:
-  /// Waits for the first frame of each pair, which is its preview. Codes: `configuration` (no pair has drivers, or
-  /// those of a pair do not fit), `read_error` (a camera does not answer, or delivers no image), and those of `open`.
+  /// Waits for the first frame of each pair, which is its preview. A pair that is not for the odometry is left out,
+  /// with a message, where a camera of it cannot be opened, and has no preview where it delivers no frame. Codes:
+  /// `configuration` (no pair has drivers, or those of a pair do not fit), `read_error` (a camera does not answer, or
+  /// delivers no image), `interrupted`, and those of `open`.
   static Result<std::unique_ptr<CameraStream>> create(const StreamInfo& info, const OpenDevice& open,
                                                       const CameraStreamOptions& options, const Log& log);
   ~CameraStream() override;
@@ -86,6 +90,7 @@ class CameraStream : public SampleStream, public CameraControl {
   std::string why_missing(const Feed& feed, std::size_t side) const;
   void push(Sample sample, std::chrono::steady_clock::time_point arrived);
   Status wait_for_previews();
+  Status report_silent_pairs() const;
   bool all_ended() const;
   bool waits() const;
   std::chrono::steady_clock::time_point next_timeout(std::chrono::steady_clock::time_point latest) const;

@@ -5,12 +5,15 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <queue>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/text_checks.h"
@@ -94,8 +97,13 @@ DeviceRead image_read(std::int64_t frame_id, int value, ImageSize size = {8, 6})
 class CameraStreamTest : public ::testing::Test {
  protected:
   void deliver(std::int64_t id) {
-    scripts["left"].add(image_read(id, 1));
-    scripts["right"].add(image_read(id, 2));
+    const DeviceRead left = image_read(id, 1);
+    DeviceRead right = image_read(id, 2);
+    right.image.began = left.image.began;  // however busy this computer is
+    right.image.complete = left.image.complete;
+    right.image.camera_ns = left.image.camera_ns;
+    left_script.add(left);
+    right_script.add(right);
   }
 
   Result<std::unique_ptr<CameraStream>> open(const Rig& rig) {
@@ -104,7 +112,8 @@ class CameraStreamTest : public ::testing::Test {
     info.path = "test:";
     CameraStreamOptions options;
     options.pair_wait = milliseconds(100);
-    options.first_wait = milliseconds(500);
+    options.first_wait = first_wait;
+    options.should_stop = should_stop;
     return CameraStream::create(
         info,
         [this](const DeviceRequest& request) -> Result<std::unique_ptr<CameraDevice>> {
@@ -112,7 +121,22 @@ class CameraStreamTest : public ::testing::Test {
           if (!script.openable) return failure(ErrorCode::read_error, "is not there", request.names());
           return std::make_unique<ScriptedCamera>(script);
         },
-        options, Log());
+        options, Log::to_function([this](LogLevel, std::string_view text) { said.emplace_back(text); }));
+  }
+
+  // While images come, of which a busy computer notices some pairs too far apart.
+  Result<std::unique_ptr<CameraStream>> open_while_delivering(const Rig& rig) {
+    std::atomic<bool> opened = false;
+    std::thread cameras([&] {
+      for (std::int64_t id = 1; !opened; ++id) {
+        deliver(id);
+        std::this_thread::sleep_for(milliseconds(20));
+      }
+    });
+    auto stream = open(rig);
+    opened = true;
+    cameras.join();
+    return stream;
   }
 
   // The next sample, waited for.
@@ -123,7 +147,55 @@ class CameraStreamTest : public ::testing::Test {
   }
 
   std::map<std::string, Script> scripts;
+  Script &left_script = scripts["left"], &right_script = scripts["right"];
+  std::vector<std::string> said;
+  milliseconds first_wait{500};
+  std::function<bool()> should_stop;
 };
+
+// A pair for panoramas, on a mast.
+Rig with_a_second_pair(Rig rig) {
+  const Rig other = two_cameras();
+  for (Camera camera : other.cameras) {
+    camera.name = "mast_" + camera.name;
+    camera.driver->source = "test:" + camera.name;
+    rig.cameras.push_back(camera);
+  }
+  rig.pairs.push_back({"mast", "mast_left", "mast_right", 0, false});
+  return rig;
+}
+
+TEST_F(CameraStreamTest, AStreamBeginsWithoutPairsThatTheOdometryDoesNotUse) {
+  first_wait = std::chrono::seconds(2);
+  scripts["mast_right"].openable = false;
+  {
+    const auto stream = open_while_delivering(with_a_second_pair(two_cameras()));
+    ASSERT_TRUE(stream) << stream.error().message();
+    EXPECT_EQ((*stream)->previews("front"), 1u);
+    EXPECT_EQ((*stream)->previews("mast"), 0u);
+    ASSERT_EQ(said.size(), 1u);
+    EXPECT_THAT(said[0], HasSubstr("pair mast is left out"));
+  }
+  said.clear();
+  scripts["mast_right"].openable = true;  // but it delivers nothing
+  {
+    const auto stream = open_while_delivering(with_a_second_pair(two_cameras()));
+    ASSERT_TRUE(stream) << stream.error().message();
+    ASSERT_EQ(said.size(), 1u);
+    EXPECT_THAT(said[0], HasSubstr("pair mast delivers no frame"));
+  }
+  scripts["right"].openable = false;
+  EXPECT_FALSE(open(with_a_second_pair(two_cameras()))) << "the pair of the odometry";
+}
+
+TEST_F(CameraStreamTest, WaitingForTheFirstFramesCanBeInterrupted) {
+  first_wait = std::chrono::seconds(100);
+  std::atomic<int> asked = 0;
+  should_stop = [&] { return ++asked > 2; };
+  const auto stream = open(two_cameras());
+  ASSERT_FALSE(stream);
+  EXPECT_EQ(stream.error().code, ErrorCode::interrupted);
+}
 
 TEST_F(CameraStreamTest, PairsOfImagesBecomeFrames) {
   deliver(1);
