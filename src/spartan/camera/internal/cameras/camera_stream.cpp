@@ -72,6 +72,7 @@ Status CameraStream::open_pair(const StereoPair& pair, const OpenDevice& open) {
     if (!source) return failure(source);
     feed->sources.push_back(std::move(*source));
   }
+  feed->waits = feed->sources.front()->waits();
   feeds_.push_back(std::move(feed));
   return {};
 }
@@ -96,7 +97,7 @@ void CameraStream::start() {
 
 void CameraStream::add(Feed& feed, int side, StampedImage image) {
   std::unique_lock lock(mutex_);
-  if (feed.sources[0]->waits()) {
+  if (feed.waits) {
     changed_.wait(lock, [&] { return feed.pairing.waiting(side) < kMostWaiting || closing_; });
   } else if (feed.pairing.waiting(side) >= kMostWaiting) {
     feed.pairing.drop_oldest(side);

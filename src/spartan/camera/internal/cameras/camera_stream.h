@@ -58,7 +58,7 @@ class CameraStream : public SampleStream, public CameraControl {
   struct Feed {
     explicit Feed(const CameraStreamOptions& options) : pairing(options.pair_tolerance_s, options.pair_wait) {}
     StereoPair pair;
-    std::vector<std::unique_ptr<ImageSource>> sources;
+    bool waits = false;  // as the first source
     ImagePairing pairing;
     std::array<std::chrono::steady_clock::time_point, 2> newest;  // images, by side
     int alone_in_row = 0;                                         // images, the newest ones
@@ -66,6 +66,7 @@ class CameraStream : public SampleStream, public CameraControl {
     CameraPairReport report;
     double skew_sum_ms = 0;
   };
+    std::vector<std::unique_ptr<ImageSource>> sources;  // last: their threads, which use the others, end first
 
   CameraStream(const StreamInfo& info, const CameraStreamOptions& options, const Log& log);
   Status open_pair(const StereoPair& pair, const OpenDevice& open);

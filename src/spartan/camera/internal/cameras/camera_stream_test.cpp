@@ -202,6 +202,34 @@ TEST_F(CameraStreamTest, WhatCannotBeDeliveredIsNamedAndCounted) {
 
 TEST_F(CameraStreamTest, ACameraThatIsLostIsOpenedAgainWithItsExposure) {
   deliver(1);
+TEST_F(CameraStreamTest, CanBeClosedWhileImagesArrive) {
+  for (int round = 0; round < 100; ++round) {
+    for (int i = 0; i < 2000; ++i) deliver(i);
+    auto stream = open(two_cameras());
+    ASSERT_TRUE(stream) << stream.error().message();
+    stream->reset();
+    for (const char* name : {"left", "right"}) {
+      const std::lock_guard lock(scripts[name].mutex);
+      ASSERT_FALSE(scripts[name].reads.empty()) << "all images have arrived before";
+      scripts[name].reads = {};
+    }
+  }
+}
+
+TEST_F(CameraStreamTest, TheBoundsOfAPairAreThoseOfBothCameras) {
+  scripts["left"].bounds = {10, 1e6, 1, 1};
+  scripts["right"].bounds = {20, 1e5, 1.2, 8};
+  deliver(1);
+  auto stream = open(two_cameras());
+  ASSERT_TRUE(stream) << stream.error().message();
+  const ExposureBounds bounds = (*stream)->exposure_bounds("front");
+  EXPECT_EQ(bounds.shortest_us, 20);
+  EXPECT_EQ(bounds.longest_us, 1e5);
+  EXPECT_EQ(bounds.smallest_gain, 1.2) << "no gain suits both: that of the right camera";
+  EXPECT_EQ(bounds.largest_gain, 1.2);
+  EXPECT_EQ((*stream)->exposure_bounds("other").shortest_us, 0);
+}
+
   auto stream = open(two_cameras());
   ASSERT_TRUE(stream) << stream.error().message();
   ASSERT_TRUE((*stream)->set_exposure("front", {2000, 1.5}));
