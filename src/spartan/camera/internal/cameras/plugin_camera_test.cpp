@@ -81,6 +81,27 @@ class Pipelines : public ::testing::Test {
     return frames;
   }
 
+  // A camera that runs now, at 40 Hz.
+  static std::string running(const std::string& properties = "") {
+    return fmt::format("videotestsrc is-live=true {} ! video/x-raw,format=GRAY8,width={},height={},framerate=40/1",
+                       properties, kWidth, kHeight);
+  }
+
+  static void expect_frames_after_a_loss(SampleStream& stream) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    std::int64_t losses = 0;
+    while (std::chrono::steady_clock::now() < until) {
+      const auto read = stream.read(std::chrono::milliseconds(100));
+      ASSERT_TRUE(read) << read.error().message();
+      ASSERT_NE(read->state, StreamRead::State::end);
+      const bool frame = read->state == StreamRead::State::sample && std::holds_alternative<StereoFrame>(*read->sample);
+      if (frame && losses > 0) return;
+      // Frames from before the loss may still wait to be read.
+      if (read->state == StreamRead::State::none_yet) losses = stream.camera_reports()[0].cameras[0].losses;
+    }
+    FAIL() << losses << " losses, and no frame after them";
+  }
+
   static void expect_patterns(const std::vector<StereoFrame>& frames) {
     ASSERT_EQ(frames.size(), static_cast<std::size_t>(kImages));
     for (int i = 0; i < kImages; ++i) {
@@ -170,6 +191,32 @@ TEST_F(Pipelines, FailWithTheReason) {
 }
 
 #endif
+
+// One of two cameras fails while the other one goes on.
+TEST_F(Pipelines, TheLossOfOneOfTwoCamerasIsNoticed) {
+  auto stream =
+      open(running() + " ! appsink name=left " + running() + " ! identity error-after=40 ! appsink name=right");
+  ASSERT_TRUE(stream) << stream.error().message();
+  expect_frames_after_a_loss(**stream);
+}
+
+TEST_F(Pipelines, TheEndOfACameraIsALossAndThatOfAFileIsTheEnd) {
+  auto stream = open(running("num-buffers=40") +
+                     " ! tee name=both ! queue ! appsink name=left both. ! queue ! appsink "
+                     "name=right");
+  ASSERT_TRUE(stream) << stream.error().message();
+  expect_frames_after_a_loss(**stream);
+  auto one_ends = open(running() + " ! appsink name=left " + running("num-buffers=40") + " ! appsink name=right");
+  ASSERT_TRUE(one_ends) << one_ends.error().message();
+  expect_frames_after_a_loss(**one_ends);
+  for (const std::string pace : {" ! appsink name=", " ! identity sync=true ! appsink name="}) {
+    auto file = open(images_of(0) + pace + "left " + images_of(1) + pace + "right");
+    ASSERT_TRUE(file) << file.error().message();
+    EXPECT_FALSE(frames_of(**file).empty());
+    EXPECT_EQ((*file)->read(std::chrono::seconds(10))->state, StreamRead::State::end) << pace;
+    EXPECT_EQ((*file)->camera_reports()[0].cameras[0].losses, 0) << pace;
+  }
+}
 
 TEST(CameraAddresses, AreChecked) {
   const auto error = [](const std::string& address, const std::string& rig) {
