@@ -363,6 +363,10 @@ int spartan_camera_set_exposure(void*, double, double, char* message, std::size_
   return 0;
 }
 
+int spartan_camera_exposure_bounds(void*, SpartanExposureBounds*) {
+  return 0;
+}
+
 void spartan_camera_close(void* opened) {
   delete static_cast<CameraPipeline*>(opened);
 }

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -91,6 +92,15 @@ struct ExposureSettings {
 /// Settings of cameras that run now. A setting applies to images whose exposure begins after the call; frames state
 /// what they were taken with. Can be called while another thread reads the stream.
 class CameraControl {
+/// The settings that cameras take.
+struct ExposureBounds {
+  double shortest_us = 0, longest_us = std::numeric_limits<double>::infinity();
+  double smallest_gain = 0, largest_gain = std::numeric_limits<double>::infinity();
+};
+
+/// The part of `wanted` that is possible; where no part is, the possible settings that are nearest.
+ExposureBounds limit(const ExposureBounds& wanted, const ExposureBounds& possible);
+
  public:
   virtual ~CameraControl() = default;
   /// Of both cameras of a pair.
@@ -98,6 +108,8 @@ class CameraControl {
   /// Takes one frame now, beside those that the cameras take by themselves. Code `configuration`: they cannot.
   virtual Status trigger(const std::string& pair) = 0;
 };
+  /// Settings beyond them are refused, by one of the cameras of a pair at least.
+  virtual ExposureBounds exposure_bounds(const std::string& /*pair*/) const { return {}; }
 
 /// As in the rig: pan positive to the left, tilt positive downwards.
 struct PanTiltAngles {

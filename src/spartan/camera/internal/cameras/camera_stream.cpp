@@ -349,6 +349,15 @@ Status CameraStream::set_exposure(const std::string& pair, const ExposureSetting
   return all;
 }
 
+ExposureBounds CameraStream::exposure_bounds(const std::string& pair) const {
+  ExposureBounds bounds;
+  for (const auto& feed : feeds_) {
+    if (feed->pair.name != pair) continue;
+    for (const auto& source : feed->sources) bounds = limit(bounds, source->exposure_bounds());
+  }
+  return bounds;
+}
+
 std::vector<CameraPairReport> CameraStream::camera_reports() const {
   const std::lock_guard lock(mutex_);
   std::vector<CameraPairReport> reports;

@@ -46,6 +46,7 @@ class CameraStream : public SampleStream, public CameraControl {
   /// Null where no camera can be controlled.
   CameraControl* control() override;
   Status set_exposure(const std::string& pair, const ExposureSettings& settings) override;
+  ExposureBounds exposure_bounds(const std::string& pair) const override;
   Status trigger(const std::string& pair) override;
   std::size_t previews(const std::string& pair) const override { return previews_.count(pair); }
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override;
@@ -65,8 +66,8 @@ class CameraStream : public SampleStream, public CameraControl {
     std::optional<Stamp> last_stamp;
     CameraPairReport report;
     double skew_sum_ms = 0;
-  };
     std::vector<std::unique_ptr<ImageSource>> sources;  // last: their threads, which use the others, end first
+  };
 
   CameraStream(const StreamInfo& info, const CameraStreamOptions& options, const Log& log);
   Status open_pair(const StereoPair& pair, const OpenDevice& open);
