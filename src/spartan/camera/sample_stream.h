@@ -137,9 +137,10 @@ class PanTiltControl {
 };
 
 /// Opens `flir:DEVICE`, a unit by FLIR or Directed Perception with their ASCII protocol at a serial line, 9600 baud;
-/// `flir:DEVICE?baud=115200&pan=1&tilt=1`: another rate, axes that count to the other side (positions count to the
-/// right and upwards by default). Codes: `usage` (no such address), `read_error` (no such device, or it does not
-/// answer).
+/// `flir:DEVICE?baud=115200&pan=1&tilt=1&pan_deg_s=30&tilt_deg_s=15`: another rate, axes that count to the other side
+/// (positions count to the right and upwards by default), speeds in degrees per second (by default those of the unit).
+/// Codes: `usage` (no such address, or a speed beyond the limits of the unit), `read_error` (no such device, or it does
+/// not answer).
 Result<std::unique_ptr<PanTiltControl>> open_pan_tilt(const std::string& address);
 
 /// Samples in order of arrival. A recording yields them ordered by stamp; from a live stream they arrive late and out
