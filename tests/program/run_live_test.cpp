@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -141,7 +142,6 @@ sleep 0.5; printf 'not a command\nstop\n' > "$target")");
   EXPECT_THAT(no_fifo.err, HasSubstr("is no FIFO"));
 }
 
-TEST_F(RunLive, TellsAServiceManagerThatItIsReady) {
 // A second writer ends the run while the first one writes for ever.
 TEST_F(RunLive, AControlFifoThatIsNeverEmptyDelaysNothing) {
   const auto begin = std::chrono::steady_clock::now();
@@ -214,6 +214,7 @@ TEST_F(RunLive, ARecordingNamesTheSensorRowsThatWereDiscarded) {
   EXPECT_EQ(nlohmann::json::parse(result.out)["skipped_sensor_rows"]["unreadable"], 1);
 }
 
+TEST_F(RunLive, TellsAServiceManagerThatItIsReady) {
   const int server = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   sockaddr_un address{};
   address.sun_family = AF_UNIX;

@@ -40,6 +40,9 @@ struct DiscardedSamples {
   std::string first_unreadable;  ///< place and fault of the first one
 };
 
+/// One line of a log for each kind that is not zero.
+std::vector<std::string> describe(const DiscardedSamples& discarded);
+
 /// Outcome of SampleStream::read().
 struct StreamRead {
   enum class State {
@@ -89,9 +92,6 @@ struct ExposureSettings {
   double gain = 1;         ///< at least 1
 };
 
-/// Settings of cameras that run now. A setting applies to images whose exposure begins after the call; frames state
-/// what they were taken with. Can be called while another thread reads the stream.
-class CameraControl {
 /// The settings that cameras take.
 struct ExposureBounds {
   double shortest_us = 0, longest_us = std::numeric_limits<double>::infinity();
@@ -101,15 +101,18 @@ struct ExposureBounds {
 /// The part of `wanted` that is possible; where no part is, the possible settings that are nearest.
 ExposureBounds limit(const ExposureBounds& wanted, const ExposureBounds& possible);
 
+/// Settings of cameras that run now. A setting applies to images whose exposure begins after the call; frames state
+/// what they were taken with. Can be called while another thread reads the stream.
+class CameraControl {
  public:
   virtual ~CameraControl() = default;
   /// Of both cameras of a pair.
   virtual Status set_exposure(const std::string& pair, const ExposureSettings& settings) = 0;
+  /// Settings beyond them are refused, by one of the cameras of a pair at least.
+  virtual ExposureBounds exposure_bounds(const std::string& /*pair*/) const { return {}; }
   /// Takes one frame now, beside those that the cameras take by themselves. Code `configuration`: they cannot.
   virtual Status trigger(const std::string& pair) = 0;
 };
-  /// Settings beyond them are refused, by one of the cameras of a pair at least.
-  virtual ExposureBounds exposure_bounds(const std::string& /*pair*/) const { return {}; }
 
 /// As in the rig: pan positive to the left, tilt positive downwards.
 struct PanTiltAngles {
@@ -220,9 +223,9 @@ bool is_live_address(std::string_view input);
 ///   pipeline of GStreamer with a side-by-side image or two sinks `left` and `right`; for the odometry's pair of
 ///   OpenOptions::rig_file, with what the drivers of its cameras state besides.
 ///
-/// Codes: `usage` (no such kind of stream, speed or passes not positive, `sensors` of a replay), `output` (the FIFO),
-/// `configuration` (drivers, or no plugin for them), `read_error` (cameras), and those of open_recording() and
-/// read_rig_yaml().
+/// Codes: `usage` (no such kind of stream, speed or passes not positive, `sensors` of a replay, `rig_file` beside
+/// `live:RIG`), `output` (the FIFO), `configuration` (drivers, or no plugin for them), `read_error` (cameras), and
+/// those of open_recording(), read_rig_yaml() and read_rig().
 Result<std::unique_ptr<SampleStream>> open_live_stream(const std::string& address, const OpenOptions& open,
                                                        const LiveOptions& options);
 

@@ -151,6 +151,19 @@ TEST_F(Pipelines, ASideBySideImageIsCutInTwo) {
   }
 }
 
+TEST_F(Pipelines, TakeACalibrationInAnyFormat) {
+  OpenOptions options;
+  options.rig_file = folder.file("calib.txt");
+  ASSERT_TRUE(write_file_atomically(
+      options.rig_file, fmt::format("cam0=[50 0 32.5; 0 50 23.5; 0 0 1]\ncam1=[50 0 32.5; 0 50 23.5; 0 0 1]\n"
+                                    "doffs=0\nbaseline=100\nwidth={}\nheight={}\n",
+                                    kWidth, kHeight)));
+  auto stream = open_live_stream(
+      "gst:" + images_of(0) + " ! appsink name=left " + images_of(1) + " ! appsink name=right", options, {});
+  ASSERT_TRUE(stream) << stream.error().message();
+  expect_patterns(frames_of(**stream));
+}
+
 TEST_F(Pipelines, DeliverTheFormatOfTheRig) {
   const auto source = [](const char* caps) {
     return fmt::format("videotestsrc num-buffers=5 ! {},width={},height={},framerate=50/1 ! appsink name=left", caps,
@@ -179,19 +192,6 @@ TEST_F(Pipelines, DeliverTheFormatOfTheRig) {
   }
 }
 
-TEST_F(Pipelines, FailWithTheReason) {
-  auto none = open("nosuchelement ! appsink name=left");
-  ASSERT_FALSE(none);
-  EXPECT_EQ(none.error().code, ErrorCode::read_error);
-  EXPECT_THAT(none.error().message(), HasSubstr("nosuchelement"));
-  EXPECT_THAT(open("videotestsrc ! appsink").error().message(), HasSubstr("no appsink named left"));
-  EXPECT_THAT(open("filesrc location=/no/such/file ! appsink name=left").error().message(), HasSubstr("/no/such/file"));
-  auto large = open("videotestsrc num-buffers=5 ! video/x-raw,format=GRAY8,width=640,height=480 ! appsink name=left");
-  EXPECT_EQ(large.error().code, ErrorCode::read_error) << "images of another size are no frames";
-}
-
-#endif
-
 // One of two cameras fails while the other one goes on.
 TEST_F(Pipelines, TheLossOfOneOfTwoCamerasIsNoticed) {
   auto stream =
@@ -218,6 +218,19 @@ TEST_F(Pipelines, TheEndOfACameraIsALossAndThatOfAFileIsTheEnd) {
   }
 }
 
+TEST_F(Pipelines, FailWithTheReason) {
+  auto none = open("nosuchelement ! appsink name=left");
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::read_error);
+  EXPECT_THAT(none.error().message(), HasSubstr("nosuchelement"));
+  EXPECT_THAT(open("videotestsrc ! appsink").error().message(), HasSubstr("no appsink named left"));
+  EXPECT_THAT(open("filesrc location=/no/such/file ! appsink name=left").error().message(), HasSubstr("/no/such/file"));
+  auto large = open("videotestsrc num-buffers=5 ! video/x-raw,format=GRAY8,width=640,height=480 ! appsink name=left");
+  EXPECT_EQ(large.error().code, ErrorCode::read_error) << "images of another size are no frames";
+}
+
+#endif
+
 TEST(CameraAddresses, AreChecked) {
   const auto error = [](const std::string& address, const std::string& rig) {
     OpenOptions options;
@@ -232,6 +245,7 @@ TEST(CameraAddresses, AreChecked) {
   EXPECT_THAT(error("aravis:one", rig), HasSubstr("aravis:LEFT,RIGHT"));
   EXPECT_THAT(error("aravis:one,", rig), HasSubstr("aravis:LEFT,RIGHT"));
   EXPECT_THAT(error("live:" + rig, ""), HasSubstr("no camera has a driver"));
+  EXPECT_THAT(error("live:" + rig, "other.yaml"), HasSubstr("omit --rig, or use live:other.yaml"));
   EXPECT_THAT(error("live:" + rig + ".missing", ""), HasSubstr("rig.yaml.missing"));
   EXPECT_THAT(error("v4l:0", rig), HasSubstr("is not the address of a live stream"));
   ASSERT_TRUE(write_file_atomically(rig, rig_text("driver: {source: 'v4l:0'},")));
