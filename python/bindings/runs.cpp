@@ -41,6 +41,7 @@ Result<std::unique_ptr<SampleStream>> open_stream(const std::string& address, co
   if (const auto scenario = program::scenario_of(address)) {
     if (!live.sensors.empty())
       return failure(ErrorCode::usage, "brings the samples of its sensors along", address, "omit sensors");
+    if (!open.rig_file.empty()) return failure(ErrorCode::usage, "has the rig of its scenario", address, "omit rig");
     auto plan = program::plan_simulation(*scenario, {}, {});
     if (!plan) return failure(plan);
     return program::open_simulation(std::move(*plan), live.speed, ThreadPool(threads));

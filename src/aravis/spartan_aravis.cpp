@@ -55,6 +55,8 @@ struct GenicamCamera {
   std::size_t payload = 0;
   std::atomic<bool> lost = false;
   std::atomic<double> exposure_us = 0, gain = 1;
+  SpartanExposureBounds bounds{};
+  bool has_bounds = false;
 };
 
 GenicamCamera::~GenicamCamera() {
@@ -123,12 +125,46 @@ bool set_trigger(ArvCamera* camera, const SpartanCameraSettings& settings, std::
   return !failed(error, "trigger " + trigger, why);
 }
 
+// GenICam states gains in decibel.
+double factor_of(double gain_db) {
+  return std::pow(10, gain_db / 20);
+}
+
+// Of a camera that counts its gain in whole numbers, the conversion to a factor and back must not give the one below.
+double decibel_of(double gain) {
+  constexpr double kResolution_db = 1e-6;
+  return std::round(20 * std::log10(gain) / kResolution_db) * kResolution_db;
+}
+
+// What the camera does not tell stays as it was.
 void read_exposure(GenicamCamera& device) {
+  CameraError error;
   ArvCamera* const camera = device.camera.get();
-  if (arv_camera_is_exposure_time_available(camera, nullptr))
-    device.exposure_us = arv_camera_get_exposure_time(camera, nullptr);
-  if (arv_camera_is_gain_available(camera, nullptr))
-    device.gain = std::pow(10, arv_camera_get_gain(camera, nullptr) / 20);
+  if (arv_camera_is_exposure_time_available(camera, nullptr)) {
+    const double exposure_us = arv_camera_get_exposure_time(camera, error.out());
+    if (!error.is_set()) device.exposure_us = exposure_us;
+  }
+  if (arv_camera_is_gain_available(camera, nullptr)) {
+    const double gain_db = arv_camera_get_gain(camera, error.out());
+    if (!error.is_set()) device.gain = factor_of(gain_db);
+  }
+}
+
+void read_bounds(GenicamCamera& device) {
+  CameraError error;
+  ArvCamera* const camera = device.camera.get();
+  SpartanExposureBounds& bounds = device.bounds;
+  arv_camera_get_exposure_time_bounds(camera, &bounds.shortest_us, &bounds.longest_us, error.out());
+  if (error.is_set()) return;
+  bounds.smallest_gain = bounds.largest_gain = 1;
+  if (arv_camera_is_gain_available(camera, nullptr)) {
+    double least_db = 0, most_db = 0;
+    arv_camera_get_gain_bounds(camera, &least_db, &most_db, error.out());
+    if (error.is_set()) return;
+    bounds.smallest_gain = factor_of(least_db);
+    bounds.largest_gain = factor_of(most_db);
+  }
+  device.has_bounds = true;
 }
 
 bool start(GenicamCamera& device, const SpartanCameraSettings& settings, std::string& why) {
@@ -136,6 +172,7 @@ bool start(GenicamCamera& device, const SpartanCameraSettings& settings, std::st
   ArvCamera* const camera = device.camera.get();
   if (!set_image(camera, settings, why) || !set_trigger(camera, settings, why)) return false;
   read_exposure(device);
+  read_bounds(device);
   // The largest packets that the network takes: fewer of them, and fewer that can be lost.
   if (arv_camera_is_gv_device(camera)) arv_camera_gv_auto_packet_size(camera, nullptr);
   device.payload = arv_camera_get_payload(camera, error.out());
@@ -254,16 +291,23 @@ int spartan_camera_set_exposure(void* opened, double exposure_us, double gain, c
   if (arv_camera_is_exposure_auto_available(camera, nullptr))
     arv_camera_set_exposure_time_auto(camera, ARV_AUTO_OFF, nullptr);
   if (arv_camera_is_gain_auto_available(camera, nullptr)) arv_camera_set_gain_auto(camera, ARV_AUTO_OFF, nullptr);
-  arv_camera_set_exposure_time(camera, exposure_us, error.out());
   std::string why;
-  // GenICam states gains in decibel.
-  if (!failed(error, "exposure time", why) && arv_camera_is_gain_available(camera, nullptr)) {
-    arv_camera_set_gain(camera, 20 * std::log10(gain), error.out());
-    if (!failed(error, "gain", why)) device.gain = gain;
+  arv_camera_set_exposure_time(camera, exposure_us, error.out());
+  failed(error, "exposure time", why);
+  if (arv_camera_is_gain_available(camera, nullptr)) {
+    arv_camera_set_gain(camera, decibel_of(gain), error.out());
+    failed(error, "gain", why);
   }
-  if (why.empty()) device.exposure_us = arv_camera_get_exposure_time(camera, nullptr);
+  // Also where it refuses one of them, so that images state what they are taken with.
+  read_exposure(device);
   report(why, message, size);
   return why.empty() ? 1 : 0;
+}
+
+int spartan_camera_exposure_bounds(void* opened, SpartanExposureBounds* bounds) {
+  const auto& device = *static_cast<const GenicamCamera*>(opened);
+  *bounds = device.bounds;
+  return device.has_bounds ? 1 : 0;
 }
 
 void spartan_camera_close(void* opened) {

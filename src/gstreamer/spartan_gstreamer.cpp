@@ -1,5 +1,6 @@
 // Cameras behind a pipeline of GStreamer: V4L2 and UVC, RTSP, video files.
 #include <gst/app/gstappsink.h>
+#include <gst/base/gstbasesrc.h>
 #include <gst/gst.h>
 #include <gst/video/video.h>
 
@@ -212,6 +213,31 @@ std::string error_on_bus(CameraPipeline& opened) {
   return text;
 }
 
+// Whether images come from a camera or over a network. A file at the pace of its stamps makes a pipeline live, too.
+bool has_live_source(const CameraPipeline& opened) {
+  const auto note = [](const GValue* element, gpointer found) {
+    GObject* const object = G_OBJECT(g_value_get_object(element));
+    if (GST_IS_BASE_SRC(object) && gst_base_src_is_live(GST_BASE_SRC(object))) *static_cast<bool*>(found) = true;
+  };
+  bool found = false;
+  GstIterator* const elements = gst_bin_iterate_recurse(GST_BIN(opened.pipeline.get()));
+  while (gst_iterator_foreach(elements, note, &found) == GST_ITERATOR_RESYNC) gst_iterator_resync(elements);
+  gst_iterator_free(elements);
+  return found;
+}
+
+// Why a live pipeline no longer has the images of both cameras; empty: it has. The end of one stream is a loss, too: a
+// camera has no last image, and its pipeline can be opened again. Images that wait are lost with it.
+std::string loss_of(CameraPipeline& opened) {
+  std::string why = error_on_bus(opened);
+  if (!why.empty()) return why;
+  {
+    const std::lock_guard lock(opened.mutex);
+    if (opened.ended == 0) return "";
+  }
+  return has_live_source(opened) ? "its stream has ended" : "";
+}
+
 bool start(CameraPipeline& opened, std::string& why) {
   GstElement* const pipeline = opened.pipeline.get();
   GstStateChangeReturn change = gst_element_set_state(pipeline, GST_STATE_PAUSED);
@@ -291,6 +317,14 @@ int spartan_camera_read(void* opened, std::int64_t timeout_ns, SpartanCameraImag
     pipeline.right.reset();
     return SPARTAN_CAMERA_IMAGE;
   }
+  // At each call: where one of two cameras is lost, the other one goes on and always has an image.
+  if (pipeline.live) {
+    const std::string why = loss_of(pipeline);
+    if (!why.empty()) {
+      report(why, message, size);
+      return SPARTAN_CAMERA_LOST;
+    }
+  }
   std::unique_lock lock(pipeline.mutex);
   pipeline.changed.wait_for(lock, std::chrono::nanoseconds(timeout_ns),
                             [&] { return !pipeline.queue.empty() || pipeline.ended == pipeline.sinks; });
@@ -301,8 +335,10 @@ int spartan_camera_read(void* opened, std::int64_t timeout_ns, SpartanCameraImag
     lock.unlock();
     return deliver(pipeline, taken, *image);
   }
-  if (pipeline.ended == pipeline.sinks) return SPARTAN_CAMERA_END;
+  const bool ended = pipeline.ended == pipeline.sinks;
   lock.unlock();
+  // That of a camera is a loss, which the next call reports.
+  if (ended) return has_live_source(pipeline) ? SPARTAN_CAMERA_NONE_YET : SPARTAN_CAMERA_END;
   const std::string why = error_on_bus(pipeline);
   if (why.empty()) return SPARTAN_CAMERA_NONE_YET;
   report(why, message, size);
@@ -324,6 +360,10 @@ int spartan_camera_trigger(void*, char* message, std::size_t size) {
 
 int spartan_camera_set_exposure(void*, double, double, char* message, std::size_t size) {
   report("the exposure of a pipeline cannot be set", message, size);
+  return 0;
+}
+
+int spartan_camera_exposure_bounds(void*, SpartanExposureBounds*) {
   return 0;
 }
 

@@ -1,11 +1,22 @@
 #include "program/control_lines.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 
 namespace spartan::program {
 namespace {
 
-constexpr std::size_t kLongestLine = 1000;
+constexpr std::size_t kMostLogged = 60;  // characters of a line
+
+// What a terminal shows without executing it.
+std::string printable_beginning(const std::string& line) {
+  std::string text = line.substr(0, kMostLogged);
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return line.size() > kMostLogged ? text + "…" : text;
+}
 
 }  // namespace
 
@@ -15,27 +26,65 @@ Result<std::unique_ptr<ControlLines>> ControlLines::open(const std::string& fifo
   return std::unique_ptr<ControlLines>(new ControlLines(std::move(*opened), log));
 }
 
-void ControlLines::receive() {
-  std::array<char, 512> bytes{};
-  for (;;) {
-    const std::size_t n = fifo_.read(bytes);
-    if (n == 0) return;
-    received_.append(bytes.data(), n);
-    if (received_.size() > kLongestLine && received_.find('\n') == std::string::npos) received_.clear();
+ControlLines::~ControlLines() {
+  if (unknown_ > 1) log_.warning(fmt::format("{} lines of the control FIFO were no commands", unknown_));
+  if (too_long_ > 1) {
+    log_.warning(fmt::format("{} lines of the control FIFO were longer than {} characters", too_long_, kLongestLine));
   }
 }
 
-std::optional<RunCommand> ControlLines::next() {
-  receive();
+void ControlLines::receive() {
+  received_.erase(0, taken_);
+  taken_ = 0;
+  std::array<char, 4096> bytes{};
+  for (std::size_t total = 0; total < kMostBytes;) {
+    const std::size_t n = fifo_.read(bytes);
+    if (n == 0) return;
+    received_.append(bytes.data(), n);
+    total += n;
+  }
+}
+
+// The next line without its end. One that is too long is left out with its rest, which must not be taken for a line.
+std::optional<std::string> ControlLines::take_line() {
   for (;;) {
-    const auto end = received_.find('\n');
-    if (end == std::string::npos) return std::nullopt;
-    std::string line = received_.substr(0, end);
-    received_.erase(0, end + 1);
+    const std::size_t end = received_.find('\n', taken_);
+    const bool is_whole = end != std::string::npos;
+    const std::size_t size = (is_whole ? end : received_.size()) - taken_;
+    const bool is_rest = is_too_long_;
+    is_too_long_ = is_rest || size > kLongestLine;
+    if (!is_whole && !is_too_long_) return std::nullopt;
+    std::string line = received_.substr(taken_, is_too_long_ ? 0 : size);
+    taken_ = is_whole ? end + 1 : received_.size();
+    if (is_too_long_ && !is_rest && ++too_long_ == 1)
+      log_.warning(fmt::format("a line of the control FIFO is longer than {} characters", kLongestLine));
+    if (!is_whole) return std::nullopt;
+    if (std::exchange(is_too_long_, false)) continue;
     if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (line == "panorama") return RunCommand::panorama;
-    if (line == "stop") return RunCommand::stop;
-    log_.warning("'" + line + "' is no command of a run: panorama or stop");
+    return line;
+  }
+}
+
+void ControlLines::reject(const std::string& line) {
+  if (++unknown_ == 1)
+    log_.warning(fmt::format("'{}' is no command of a run: panorama or stop", printable_beginning(line)));
+}
+
+std::optional<RunCommand> ControlLines::next() {
+  for (;;) {
+    auto line = take_line();
+    if (!line && !has_read_) {
+      has_read_ = true;
+      receive();
+      line = take_line();
+    }
+    if (!line) {
+      has_read_ = false;
+      return std::nullopt;
+    }
+    if (*line == "panorama") return RunCommand::panorama;
+    if (*line == "stop") return RunCommand::stop;
+    reject(*line);
   }
 }
 

@@ -18,13 +18,14 @@ struct LiveArguments {
   std::vector<std::string> scenario_keys = {};  ///< assignments "group.key=value"
 };
 
-/// Adds --speed, --passes, --sensors and --set-scenario.
-void add_live_options(CLI::App& command, LiveArguments& arguments);
+/// Adds --speed, --passes, --sensors and --set-scenario, and returns them.
+std::vector<const CLI::Option*> add_live_options(CLI::App& command, LiveArguments& arguments);
 
 /// Whether an input is the address of a live stream, and not a recording.
 bool is_live_input(const std::string& input);
 
-/// Opens `sim:SCENARIO` (open_simulation()), or what open_live_stream() opens.
+/// Opens `sim:SCENARIO` (open_simulation()), or what open_live_stream() opens. Codes: theirs, and `usage` for arguments
+/// that have no meaning for this kind of stream.
 Result<std::unique_ptr<SampleStream>> open_live_input(const Context& context, const std::string& address,
                                                       const OpenOptions& open, const LiveArguments& arguments);
 

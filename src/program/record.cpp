@@ -58,13 +58,16 @@ Result<ExitCode> record_command(const Context& context, const RecordArguments& a
   const RecorderProgress written = (*recorder)->progress();
   if (written.dropped > 0)
     context.log.warning(fmt::format("{} frames were not recorded: the disk is too slow", written.dropped));
+  const DiscardedSamples discarded = (*stream)->discarded();
+  for (const std::string& line : describe(discarded)) context.log.warning(line);
   for (const CameraPairReport& report : (*stream)->camera_reports()) context.log.info(describe(report));
   const Json json = {{"schema", 1},
                      {"recording", arguments.output},
                      {"frames", written.frames},
                      {"sensor_samples", written.sensor_samples},
                      {"dropped", written.dropped},
-                     {"rejected", written.rejected}};
+                     {"rejected", written.rejected},
+                     {"skipped_sensor_rows", {{"reversed", discarded.reversed}, {"unreadable", discarded.unreadable}}}};
   const std::string text = fmt::format("{} frames and {} sensor samples recorded in {}\n", written.frames,
                                        written.sensor_samples, arguments.output);
   const Status printed = print(context.json ? text_of(json) + "\n" : text);
@@ -86,7 +89,8 @@ void add_record(CLI::App& app, Context& context) {
       ->required();
   command->add_option("-o,--output", a->output, "Folder of the recording to create.")->required();
   command->add_option("--rig", a->recording.rig,
-                      "Calibration file to use, in any supported format (default: that of the stream).");
+                      "Calibration file to use, in any supported format (default: that of the stream). live:RIG and "
+                      "sim:SCENARIO have theirs.");
   add_recording_options(*command, a->recording);
   command
       ->add_option("--seconds", a->seconds,

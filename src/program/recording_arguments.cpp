@@ -49,8 +49,8 @@ Result<OpenOptions> open_options(const RecordingArguments& a) {
   return open;
 }
 
-void add_recorded_images_option(CLI::App& command, std::string& value) {
-  command
+CLI::Option* add_recorded_images_option(CLI::App& command, std::string& value) {
+  return command
       .add_option("--record-images", value,
                   "Files of recorded images: pnm (default) is fast to write, png half as large; both are lossless.")
       ->check(CLI::IsMember({"pnm", "png"}));

@@ -25,7 +25,7 @@ void add_recorded_frames_options(CLI::App& command, RecordingArguments& argument
 Result<OpenOptions> open_options(const RecordingArguments& arguments);
 
 /// `--record-images png|pnm`, for commands that record a stream.
-void add_recorded_images_option(CLI::App& command, std::string& value);
+CLI::Option* add_recorded_images_option(CLI::App& command, std::string& value);
 ImageFiles image_files_of(const std::string& value);
 
 /// Logs what a recording does not state and is assumed, and irregularities of its files.

@@ -43,6 +43,7 @@ struct RunArguments {
   std::string publish, record_images = "pnm";
   bool no_recording = false;
   double watchdog_s = kWatchdog_s;
+  std::vector<const CLI::Option*> live_only;  ///< those that have no meaning for a recording
 };
 
 // The messages of a run; none without --publish.
@@ -136,7 +137,20 @@ Result<RunOutcome> run_input(const Context& context, const RunArguments& argumen
   return run_live(**stream, request, hooks);
 }
 
-Result<ExitCode> run_command(const Context& context, const RunArguments& arguments) {
+// Code `usage`: an option of live runs, given for a recording.
+Status expect_no_live_option(const RunArguments& arguments) {
+  if (is_live_input(arguments.input)) return {};
+  for (const CLI::Option* option : arguments.live_only) {
+    if (option->count() == 0) continue;
+    return failure(ErrorCode::usage, option->get_name() + " is an option of live runs, and this is a recording",
+                   arguments.input,
+                   fmt::format("omit it, or play the recording as a live stream: replay:{}", arguments.input));
+  }
+  return {};
+}
+
+Result<RunRequest> request_of(const Context& context, const RunArguments& arguments) {
+  if (Status s = expect_no_live_option(arguments); !s) return failure(s);
   RunRequest request;
   auto chosen = choose_options(context, arguments.config, arguments.set);
   if (!chosen) return failure(chosen);
@@ -159,7 +173,12 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   if (arguments.panorama_every_m > 0) request.options.panorama.every_m = arguments.panorama_every_m;
   request.record = !arguments.no_recording;
   request.recorded_images = image_files_of(arguments.record_images);
+  return request;
+}
 
+Result<ExitCode> run_command(const Context& context, const RunArguments& arguments) {
+  const auto request = request_of(context, arguments);
+  if (!request) return failure(request);
   Progress progress(context.quiet);
   if (!arguments.truth.empty()) {
     if (const auto truth = load_truth(arguments.truth); !truth) return failure(truth);
@@ -170,7 +189,7 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
                                            : ControlLines::open(arguments.control, context.log);
   if (!control) return failure(control);
   ServiceNotifier service;
-  auto outcome = run_input(context, arguments, request,
+  auto outcome = run_input(context, arguments, *request,
                            live_hooks(context, progress, {publisher->get(), control->get(), service}));
   service.stopping();
   if (!outcome) return failure(outcome);
@@ -183,10 +202,10 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   const bool live = is_live_input(arguments.input);
   if (live) accept_interrupt();
   if (!outcome->interrupted && !live) {
-    if (Status s = write_report(request, arguments.truth, context); !s)
+    if (Status s = write_report(*request, arguments.truth, context); !s)
       context.log.warning("no report was written: " + s.error().message());
   }
-  if (outcome->lost && !outcome->interrupted && !live) advise(request, *outcome, context);
+  if (outcome->lost && !outcome->interrupted && !live) advise(*request, *outcome, context);
   if (*publisher && (*publisher)->discarded() > 0)
     context.log.warning(fmt::format("{} messages discarded: their reader was too slow", (*publisher)->discarded()));
   const bool messages_on_output = arguments.publish == "-";
@@ -196,6 +215,36 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
     return failure(ErrorCode::interrupted, "interrupted by the user", arguments.output, "continue with --resume");
   }
   return outcome->lost ? kLost : kDone;
+}
+
+// Those that have no meaning for a recording.
+void add_live_run_options(CLI::App& command, RunArguments& arguments) {
+  arguments.live_only = add_live_options(command, arguments.live);
+  const auto live_only = [&](CLI::Option* option) { arguments.live_only.push_back(option); };
+  live_only(
+      command
+          .add_option(
+              "--panorama-every", arguments.panorama_every_m,
+              "Of a live run: take a panorama each time that the rover is stationary and has driven so many metres "
+              "since the last one (default: panorama.every_m of the options).")
+          ->check(CLI::PositiveNumber));
+  live_only(command.add_option(
+      "--pan-tilt", arguments.pan_tilt,
+      "Of a live run: the pan-tilt unit, flir:DEVICE (default: that of a simulation). '?pan_deg_s=30&tilt_deg_s=15' "
+      "behind it sets the speeds of its axes in degrees per second (default: those of the unit)."));
+  live_only(command.add_option(
+      "--control", arguments.control,
+      "Of a live run: a FIFO, created if there is none, whose lines are commands: panorama takes one as "
+      "soon as the rover is stationary, stop ends the run (default: none)."));
+  live_only(command.add_flag("--no-recording", arguments.no_recording,
+                             "Of a live run: do not record the stream in the folder `live` of the run."));
+  live_only(add_recorded_images_option(command, arguments.record_images));
+  live_only(
+      command
+          .add_option("--watchdog", arguments.watchdog_s,
+                      "Of a live run: end the program, with the name of the stage, if one has not ended after so many "
+                      "seconds (default 60; 0: never).")
+          ->check(CLI::NonNegativeNumber));
 }
 
 }  // namespace
@@ -220,7 +269,8 @@ void add_run(CLI::App& app, Context& context) {
                    "Run folder to create. An existing one is an error without --resume or --force.")
       ->required();
   command->add_option("--rig", a->recording.rig,
-                      "Calibration file to use, in any supported format (default: the recording's own).");
+                      "Calibration file to use, in any supported format (default: the recording's own). live:RIG and "
+                      "sim:SCENARIO have theirs.");
   add_recording_options(*command, a->recording);
   command->add_option("--config", a->config,
                       "YAML file with options that differ from the defaults (see `spartan config dump`).");
@@ -245,31 +295,11 @@ void add_run(CLI::App& app, Context& context) {
   command->add_flag("--odometry-only", a->odometry_only,
                     "Run the visual odometry alone: no localization, maps, SLAM, disparity images or "
                     "point clouds.");
-  add_live_options(*command, a->live);
   command->add_option(
       "--publish", a->publish,
       "Publish poses at the rate of the IMU, health and maps as JSON lines: to - (standard output, without the "
       "summary), to a FIFO, to tcp:PORT of this computer, or to tcp:ADDRESS:PORT (default: nowhere).");
-  command
-      ->add_option(
-          "--panorama-every", a->panorama_every_m,
-          "Of a live run: take a panorama each time that the rover is stationary and has driven so many metres "
-          "since the last one (default: panorama.every_m of the options).")
-      ->check(CLI::PositiveNumber);
-  command->add_option("--pan-tilt", a->pan_tilt,
-                      "Of a live run: the pan-tilt unit, flir:DEVICE (default: that of a simulation).");
-  command->add_option(
-      "--control", a->control,
-      "Of a live run: a FIFO, created if there is none, whose lines are commands: panorama takes one as "
-      "soon as the rover is stationary, stop ends the run (default: none).");
-  command->add_flag("--no-recording", a->no_recording,
-                    "Of a live run: do not record the stream in the folder `live` of the run.");
-  add_recorded_images_option(*command, a->record_images);
-  command
-      ->add_option("--watchdog", a->watchdog_s,
-                   "Of a live run: end the program, with the name of the stage, if one has not ended after so many "
-                   "seconds (default 60; 0: never).")
-      ->check(CLI::NonNegativeNumber);
+  add_live_run_options(*command, *a);
   add_force_flag(*command, context)->excludes(resume);
   add_threads_option(*command, context);
   add_memory_option(*command, context);

@@ -8,6 +8,7 @@ The control port of GigE Vision is fixed, so each camera has an address of its o
 (a network namespace, which Debian lets every user have). Without namespaces the test is skipped (77).
 """
 import argparse
+import csv
 import fcntl
 import json
 import os
@@ -99,11 +100,11 @@ def rig_with_drivers(spartan, recording, folder):
 class LiveRun:
     """A live run of both cameras; its poses, and what it says."""
 
-    def __init__(self, arguments, folder):
+    def __init__(self, arguments, folder, options=("--no-recording",)):
         self.out, self.log = folder / "run", folder / "log"
         rig = rig_with_drivers(arguments.spartan, arguments.recording, folder)
         command = [arguments.spartan, "run", f"live:{rig}", "-o", str(self.out), "--threads", "1",
-                   "--no-recording", "--publish", "-", "--set", "maps=false", "--set", "terrain.enabled=false"]
+                   "--publish", "-", "--set", "maps=false", "--set", "terrain.enabled=false", *options]
         with open(self.log, "w", encoding="utf-8") as text:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=text, text=True)
 
@@ -182,7 +183,25 @@ def case_unplugged(arguments):
     assert pair["frames"] > POSES, "frames with both images, before and after"
 
 
-CASES = {"plain": case_plain, "lost_packets": case_lost_packets, "unplugged": case_unplugged}
+def case_exposure(arguments):
+    """Images that are always too dark: settings go to the bounds of the cameras, 10 dB of gain, and none is refused."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        with Cameras(arguments.fake, arguments.recording, 0, folder):
+            run = LiveRun(arguments, folder, ["--set", "exposure.level_percent=90", "--set", "exposure.highlight_percent=100",
+                                              "--set", "exposure.longest_us=2000"])
+            run.wait_for_poses(POSES, arguments.seconds)
+            summary, said = run.end()
+        with open(run.out / "live" / "1" / "frames.csv", encoding="utf-8") as table:
+            frames = list(csv.DictReader(table))
+    print(json.dumps(summary["live"]["exposure"]), frames[-1]["exposure_us"], frames[-1]["gain"])
+    assert "gain:" not in said and "exposure time:" not in said, said
+    assert float(frames[-1]["exposure_us"]) == 2000, frames[-1]
+    assert abs(float(frames[-1]["gain"]) - 10 ** 0.5) < 1e-3, frames[-1]
+    assert summary["live"]["exposure"]["changes"] < POSES / 2, "settings are sent again and again"
+
+
+CASES = {"plain": case_plain, "exposure": case_exposure, "lost_packets": case_lost_packets, "unplugged": case_unplugged}
 
 
 def arguments_of(command_line):

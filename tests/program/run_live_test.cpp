@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -139,6 +140,78 @@ sleep 0.5; printf 'not a command\nstop\n' > "$target")");
   const ProgramResult no_fifo = run_live("other", {"--control", path("live/summary.json")});
   EXPECT_EQ(no_fifo.exit_code, 5);
   EXPECT_THAT(no_fifo.err, HasSubstr("is no FIFO"));
+}
+
+// A second writer ends the run while the first one writes for ever.
+TEST_F(RunLive, AControlFifoThatIsNeverEmptyDelaysNothing) {
+  const auto begin = std::chrono::steady_clock::now();
+  const ProgramResult result =
+      run_with_reader(path("control"), R"sh("$program" "${@/#-q/--json}" --passes 40 --control "$target" &
+for i in $(seq 200); do sleep 0.05; [ -p "$target" ] && break; done
+{ head -c 5000 /dev/zero; echo; } > "$target"
+timeout 40 yes "$(printf 'y\033[2J%0100d' 0)" > "$target" &
+sleep 1; printf '\nstop\n' > "$target")sh");
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_LT(seconds, 25) << "of 40";
+  EXPECT_LT(result.err.size(), 2000u) << "one line of each kind, and their number: " << result.err;
+  EXPECT_THAT(result.err, HasSubstr("'y?[2J000"));
+  EXPECT_THAT(result.err, HasSubstr("is no command of a run"));
+  EXPECT_THAT(result.err, HasSubstr("lines of the control FIFO were no commands"));
+  EXPECT_THAT(result.err, HasSubstr("longer than 1000 characters"));
+}
+
+TEST_F(RunLive, ItsOptionsAreRejectedForARecording) {
+  const std::string fifo = path("fifo");
+  const std::vector<std::vector<std::string>> all{{"--speed", "2"},          {"--passes", "2"},
+                                                  {"--sensors", fifo},       {"--set-scenario", "rover=ordinary"},
+                                                  {"--control", fifo},       {"--pan-tilt", "flir:/dev/null"},
+                                                  {"--panorama-every", "2"}, {"--watchdog", "0"},
+                                                  {"--no-recording"},        {"--record-images", "png"}};
+  for (const std::vector<std::string>& option : all) {
+    const ProgramResult result = run("other", option);
+    EXPECT_EQ(result.exit_code, 2) << option[0];
+    EXPECT_THAT(result.err, HasSubstr(option[0]));
+    EXPECT_THAT(result.err, HasSubstr("replay:" + drive())) << "what to do";
+  }
+  EXPECT_FALSE(std::filesystem::exists(fifo)) << "nothing is made";
+  EXPECT_FALSE(std::filesystem::exists(path("other")));
+}
+
+TEST_F(RunLive, WhatHasNoEffectOnAStreamIsRejected) {
+  const auto rejected = [&](const std::string& input, const std::vector<std::string>& option) {
+    for (const std::string command : {"run", "record"}) {
+      std::vector<std::string> words{command, input, "-o", path("other")};
+      words.insert(words.end(), option.begin(), option.end());
+      const ProgramResult result = run_program(words);
+      EXPECT_EQ(result.exit_code, 2) << command << ' ' << input << ' ' << option[0] << result.err;
+      EXPECT_THAT(result.err, HasSubstr("omit ")) << input << ' ' << option[0];
+      EXPECT_THAT(result.err, HasSubstr(option[0])) << input;
+    }
+  };
+  const std::string rig = drive() + "/calib.txt";
+  rejected("live:rig.yaml", {"--rig", rig});
+  rejected("sim:quick", {"--rig", rig});
+  rejected("sim:quick", {"--passes", "2"});
+  rejected("sim:quick", {"--sensors", path("fifo")});
+  rejected("gst:videotestsrc", {"--speed", "2"});
+  rejected("aravis:a,b", {"--set-scenario", "rover=ordinary"});
+  rejected("gst:videotestsrc", {"--fps", "2"});
+  rejected("replay:" + drive(), {"--set-scenario", "rover=ordinary"});
+  EXPECT_FALSE(std::filesystem::exists(path("fifo")));
+}
+
+TEST_F(RunLive, ARecordingNamesTheSensorRowsThatWereDiscarded) {
+  const std::string stops = testing::small_runs_folder() + "/stops/rec";
+  if (!std::filesystem::exists(stops)) GTEST_SKIP() << "built without Embree";
+  std::filesystem::copy(stops, path("rec"), std::filesystem::copy_options::recursive);
+  std::ofstream(path("rec/sensors/wheels.csv"), std::ios::app) << "nothing,1,2\n";
+  const ProgramResult result =
+      run_program({"record", "replay:" + path("rec"), "-o", path("copy"), "--speed", "1000", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("1 rows of sensor tables discarded"));
+  EXPECT_THAT(result.err, HasSubstr("'nothing' is not a time in nanoseconds"));
+  EXPECT_EQ(nlohmann::json::parse(result.out)["skipped_sensor_rows"]["unreadable"], 1);
 }
 
 TEST_F(RunLive, TellsAServiceManagerThatItIsReady) {

@@ -1,4 +1,4 @@
-// Text of camera reports.
+// What a stream has delivered and discarded, as text.
 #include <fmt/format.h>
 
 #include <array>
@@ -21,6 +21,19 @@ std::string counts_text(Counts counts) {
 }
 
 }  // namespace
+
+std::vector<std::string> describe(const DiscardedSamples& discarded) {
+  std::vector<std::string> lines;
+  if (discarded.reversed > 0) {
+    lines.push_back(
+        fmt::format("{} sensor samples discarded: their time stamps are not in increasing order", discarded.reversed));
+  }
+  if (discarded.unreadable > 0) {
+    lines.push_back(fmt::format("{} rows of sensor tables discarded: they cannot be parsed; the first: {}",
+                                discarded.unreadable, discarded.first_unreadable));
+  }
+  return lines;
+}
 
 std::string describe(const CameraPairReport& report) {
   std::string text = fmt::format("pair {}: {} frames, skew {:.3f} ms on average, {:.3f} ms at most", report.pair,

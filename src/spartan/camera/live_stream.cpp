@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "spartan/calibration_io/calibration_files.h"
 #include "spartan/camera/internal/cameras/camera_stream.h"
 #include "spartan/camera/internal/cameras/plugin_camera.h"
 #include "spartan/camera/internal/replay_stream.h"
@@ -63,7 +64,7 @@ StreamResult open_address(const std::string& address, const OpenOptions& open, c
   }
   const auto sources = sources_of(address);
   if (!sources) return failure(sources);
-  auto rig = read_rig_yaml(open.rig_file);
+  auto rig = read_rig(open.rig_file);
   if (!rig) return failure(rig);
   const auto pair = std::find_if(rig->pairs.begin(), rig->pairs.end(), [](const auto& p) { return p.for_odometry; });
   if (pair == rig->pairs.end()) return failure(ErrorCode::configuration, "has no pair for odometry", open.rig_file);
@@ -88,6 +89,10 @@ StreamResult open_replay(const std::string& address, const OpenOptions& open, co
 
 StreamResult open_rig_cameras(const std::string& address, const OpenOptions& open, const LiveOptions& options) {
   const std::string file = address.substr(kLive.size());
+  if (!open.rig_file.empty()) {
+    return failure(ErrorCode::usage, "names the rig itself, so " + open.rig_file + " would have no effect", address,
+                   "omit --rig, or use live:" + open.rig_file);
+  }
   auto rig = read_rig_yaml(file);
   if (!rig) return failure(rig);
   return open_cameras(address, file, std::move(*rig), open, options);

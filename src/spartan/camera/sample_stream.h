@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -39,6 +40,9 @@ struct DiscardedSamples {
   std::int64_t unreadable = 0;   ///< they cannot be parsed
   std::string first_unreadable;  ///< place and fault of the first one
 };
+
+/// One line of a log for each kind that is not zero.
+std::vector<std::string> describe(const DiscardedSamples& discarded);
 
 /// Outcome of SampleStream::read().
 struct StreamRead {
@@ -89,6 +93,15 @@ struct ExposureSettings {
   double gain = 1;         ///< at least 1
 };
 
+/// The settings that cameras take.
+struct ExposureBounds {
+  double shortest_us = 0, longest_us = std::numeric_limits<double>::infinity();
+  double smallest_gain = 0, largest_gain = std::numeric_limits<double>::infinity();
+};
+
+/// The part of `wanted` that is possible; where no part is, the possible settings that are nearest.
+ExposureBounds limit(const ExposureBounds& wanted, const ExposureBounds& possible);
+
 /// Settings of cameras that run now. A setting applies to images whose exposure begins after the call; frames state
 /// what they were taken with. Can be called while another thread reads the stream.
 class CameraControl {
@@ -96,6 +109,8 @@ class CameraControl {
   virtual ~CameraControl() = default;
   /// Of both cameras of a pair.
   virtual Status set_exposure(const std::string& pair, const ExposureSettings& settings) = 0;
+  /// Settings beyond them are refused, by one of the cameras of a pair at least.
+  virtual ExposureBounds exposure_bounds(const std::string& /*pair*/) const { return {}; }
   /// Takes one frame now, beside those that the cameras take by themselves. Code `configuration`: they cannot.
   virtual Status trigger(const std::string& pair) = 0;
 };
@@ -126,9 +141,10 @@ class PanTiltControl {
 };
 
 /// Opens `flir:DEVICE`, a unit by FLIR or Directed Perception with their ASCII protocol at a serial line, 9600 baud;
-/// `flir:DEVICE?baud=115200&pan=1&tilt=1`: another rate, axes that count to the other side (positions count to the
-/// right and upwards by default). Codes: `usage` (no such address), `read_error` (no such device, or it does not
-/// answer).
+/// `flir:DEVICE?baud=115200&pan=1&tilt=1&pan_deg_s=30&tilt_deg_s=15`: another rate, axes that count to the other side
+/// (positions count to the right and upwards by default), speeds in degrees per second (by default those of the unit).
+/// Codes: `usage` (no such address, or a speed beyond the limits of the unit), `read_error` (no such device, or it does
+/// not answer).
 Result<std::unique_ptr<PanTiltControl>> open_pan_tilt(const std::string& address);
 
 /// Samples in order of arrival. A recording yields them ordered by stamp; from a live stream they arrive late and out
@@ -212,9 +228,9 @@ bool is_live_address(std::string_view input);
 ///   pipeline of GStreamer with a side-by-side image or two sinks `left` and `right`; for the odometry's pair of
 ///   OpenOptions::rig_file, with what the drivers of its cameras state besides.
 ///
-/// Codes: `usage` (no such kind of stream, speed or passes not positive, `sensors` of a replay), `output` (the FIFO),
-/// `configuration` (drivers, or no plugin for them), `read_error` (cameras), and those of open_recording() and
-/// read_rig_yaml().
+/// Codes: `usage` (no such kind of stream, speed or passes not positive, `sensors` of a replay, `rig_file` beside
+/// `live:RIG`), `output` (the FIFO), `configuration` (drivers, or no plugin for them), `read_error` (cameras), and
+/// those of open_recording(), read_rig_yaml() and read_rig().
 Result<std::unique_ptr<SampleStream>> open_live_stream(const std::string& address, const OpenOptions& open,
                                                        const LiveOptions& options);
 

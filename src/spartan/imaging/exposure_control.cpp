@@ -20,6 +20,7 @@ constexpr double kHighQuantile = 0.98;
 // saturated. A factor that is too small or too large in one step is followed by another step.
 constexpr double kSaturated = 0.995, kBeyondHigh = 1.5, kBeyondMedian = 5, kAllSaturated = 0.99;
 constexpr double kLargestFactor = 16;
+constexpr double kSameSetting = 1e-3;     // relative; cameras round their settings
 constexpr double kNearest_m = 1;          // where the rig does not state it
 constexpr double kLeastMedian = 1.0 / 3;  // of the level, where highlights would be saturated
 
@@ -58,6 +59,10 @@ double pixels_per_radian(const Camera& camera) {
   if (!first || !second) return 0;
   const double sine = first->direction.normalized().cross(second->direction.normalized()).norm();
   return sine > 0 ? kApart_px / std::asin(std::min(sine, 1.0)) : 0;
+}
+
+bool is_close(double a, double b) {
+  return std::abs(a - b) <= kSameSetting * b;
 }
 
 }  // namespace
@@ -121,27 +126,30 @@ double ExposureControl::brightness_factor(const GroundBrightness& ground) const 
 }
 
 // Exposure time up to the limit of motion blur, then gain, then a longer exposure.
-ExposureSettings ExposureControl::split(double product_us, double motion_px_s) const {
-  const double by_blur = motion_px_s > 0 ? 1e6 * options_.most_blur_px / motion_px_s : options_.longest_us;
-  const double sharp_us = std::clamp(by_blur, options_.shortest_us, options_.longest_us);
-  double time_us = std::clamp(product_us, options_.shortest_us, sharp_us);
-  const double gain = std::clamp(product_us / time_us, 1.0, options_.largest_gain);
-  time_us = std::clamp(product_us / gain, options_.shortest_us, options_.longest_us);
+ExposureSettings ExposureControl::split(double product_us, double motion_px_s, const ExposureBounds& cameras) const {
+  const ExposureBounds bounds = limit({options_.shortest_us, options_.longest_us, 1, options_.largest_gain}, cameras);
+  const double by_blur = motion_px_s > 0 ? 1e6 * options_.most_blur_px / motion_px_s : bounds.longest_us;
+  const double sharp_us = std::clamp(by_blur, bounds.shortest_us, bounds.longest_us);
+  double time_us = std::clamp(product_us, bounds.shortest_us, sharp_us);
+  const double gain = std::clamp(product_us / time_us, bounds.smallest_gain, bounds.largest_gain);
+  time_us = std::clamp(product_us / gain, bounds.shortest_us, bounds.longest_us);
   return {time_us, gain};
 }
 
 std::optional<ExposureSettings> ExposureControl::update(const GroundBrightness& ground, const ExposureSettings& taken,
-                                                        double motion_px_s) const {
+                                                        double motion_px_s, const ExposureBounds& bounds) const {
   if (!(taken.exposure_us > 0)) return std::nullopt;
   const double gain = std::max(taken.gain, 1.0);
   double factor = brightness_factor(ground);
   const bool bright_enough = std::abs(std::log(factor)) <= std::log1p(0.01 * options_.tolerance_percent);
   if (bright_enough) factor = 1;
-  const ExposureSettings wanted = split(taken.exposure_us * gain * factor, motion_px_s);
+  const ExposureSettings wanted = split(taken.exposure_us * gain * factor, motion_px_s, bounds);
   // The division into time and gain follows the speed only where it matters.
   const double longer = taken.exposure_us / wanted.exposure_us;
   if (bright_enough && longer < 1.2 && longer > 0.5) return std::nullopt;
-  return wanted;
+  // At the bounds nothing is left to change.
+  const bool as_taken = is_close(wanted.exposure_us, taken.exposure_us) && is_close(wanted.gain, gain);
+  return as_taken ? std::nullopt : std::optional(wanted);
 }
 
 double ground_motion_px_s(const Rig& rig, const StereoPair& pair, const Vector6d& body_velocity) {

@@ -94,14 +94,14 @@ class ExposureControl {
  public:
   explicit ExposureControl(const ExposureOptions& options) : options_(options) {}
 
-  /// `taken`: the settings of the frame that was measured; `motion_px_s`: image motion of the nearest ground. Empty: no
-  /// change.
+  /// `taken`: the settings of the frame that was measured; `motion_px_s`: image motion of the nearest ground; `bounds`:
+  /// of the cameras, beside those of the options. Empty: no change.
   std::optional<ExposureSettings> update(const GroundBrightness& ground, const ExposureSettings& taken,
-                                         double motion_px_s) const;
+                                         double motion_px_s, const ExposureBounds& bounds = {}) const;
 
  private:
   double brightness_factor(const GroundBrightness& ground) const;
-  ExposureSettings split(double product_us, double motion_px_s) const;
+  ExposureSettings split(double product_us, double motion_px_s, const ExposureBounds& bounds) const;
 
   ExposureOptions options_;
 };

@@ -176,6 +176,50 @@ TEST(ExposureControl, MotionBlurLimitsTheExposureUntilTheGainIsLargest) {
   EXPECT_NEAR(dark.exposure_us, 4000, 800) << "better blurred than dark";
 }
 
+// A camera takes settings within its bounds only, and states what it took.
+std::vector<ExposureSettings> loop_with_camera(const std::vector<double>& lights, double motion_px_s,
+                                               const ExposureBounds& bounds, int& sent) {
+  const ExposureControl control{ExposureOptions()};
+  ExposureSettings settings{500, bounds.smallest_gain};
+  std::vector<ExposureSettings> taken;
+  for (const double light : lights) {
+    taken.push_back(settings);
+    const auto wanted = control.update(seen(light, settings), settings, motion_px_s, bounds);
+    if (!wanted) continue;
+    ++sent;
+    if (wanted->exposure_us >= bounds.shortest_us && wanted->exposure_us <= bounds.longest_us)
+      settings.exposure_us = wanted->exposure_us;
+    if (wanted->gain >= bounds.smallest_gain && wanted->gain <= bounds.largest_gain) settings.gain = wanted->gain;
+  }
+  return taken;
+}
+
+TEST(ExposureControl, ACameraWithoutGainIsExposedLongerAndSettles) {
+  const double motion_px_s = 250;  // 1 px in 4 ms
+  const ExposureBounds no_gain{10, 1e6, 1, 1};
+  const double bright = 0.28 / 2000;
+  std::vector<double> lights(20, bright);
+  lights.insert(lights.end(), 40, bright / 8);
+  int sent = 0;
+  const auto taken = loop_with_camera(lights, motion_px_s, no_gain, sent);
+  EXPECT_NEAR(taken.back().exposure_us, 16000, 0.2 * 16000) << "beyond the blur limit, where gain cannot help";
+  EXPECT_LT(sent, 12) << "settings are not sent again";
+  for (std::size_t i = 40; i < taken.size(); ++i) EXPECT_EQ(taken[i].exposure_us, taken.back().exposure_us);
+}
+
+TEST(ExposureControl, KeepsToTheBoundsOfTheCameras) {
+  const double dark = 0.3 / 1e6;
+  const ExposureBounds bounds{100, 5000, 1.5, 15.8};
+  int sent = 0;
+  const ExposureSettings last = loop_with_camera(std::vector<double>(30, dark), 250, bounds, sent).back();
+  EXPECT_EQ(last.exposure_us, 5000);
+  EXPECT_EQ(last.gain, 15.8);
+  EXPECT_LT(sent, 10) << "at the bounds nothing is left to change";
+  const ExposureSettings glaring = loop_with_camera(std::vector<double>(30, 1), 250, bounds, sent).back();
+  EXPECT_EQ(glaring.exposure_us, 100);
+  EXPECT_EQ(glaring.gain, 1.5);
+}
+
 TEST(ExposureControl, KeepsHighlightsButNotAtAnyPrice) {
   const ExposureControl control{ExposureOptions()};
   GroundBrightness ground{0.3, 0.9, 0, 0.5};

@@ -176,18 +176,6 @@ Result<RunOutcome> write_results(RunLoop& run_loop, const RunOptions& options, c
   return outcome;
 }
 
-void report_sensor_rows(const SampleStream& stream, const Log& log) {
-  const DiscardedSamples discarded = stream.discarded();
-  if (discarded.reversed > 0) {
-    log.warning(
-        fmt::format("{} sensor samples discarded: their time stamps are not in increasing order", discarded.reversed));
-  }
-  if (discarded.unreadable > 0) {
-    log.warning(fmt::format("{} rows of sensor tables discarded: they cannot be parsed; the first: {}",
-                            discarded.unreadable, discarded.first_unreadable));
-  }
-}
-
 RunFacts facts_of(const RunRequest& request, const RunSource& source, const RunOptions& options,
                   const RunLoop& run_loop) {
   RunFacts facts;
@@ -338,7 +326,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   if (source.queue) end_recording(*source.queue, hooks.log);
   if (!processed) return failure(processed);
   if (run_loop.stopped()) report_stop(run_loop, hooks.log);
-  report_sensor_rows(source.stream, hooks.log);
+  for (const std::string& line : describe(source.stream.discarded())) hooks.log.warning(line);
   if (source.queue) report_dropped(*source.queue, hooks.log);
   for (const CameraPairReport& report : source.stream.camera_reports()) hooks.log.info(describe(report));
   if (run_loop.usable_frames() == 0 && !run_loop.stopped()) {

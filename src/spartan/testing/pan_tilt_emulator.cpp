@@ -15,9 +15,9 @@ namespace spartan::testing {
 
 using Clock = std::chrono::steady_clock;
 
-PanTiltEmulator::PanTiltEmulator(double steps_per_second) : steps_per_second_(steps_per_second), moved_(Clock::now()) {
-  axes_[0] = {0, 0, -3090, 3090};
-  axes_[1] = {0, 0, -907, 604};
+PanTiltEmulator::PanTiltEmulator(double steps_per_second) : own_speed_(steps_per_second), moved_(Clock::now()) {
+  axes_[0] = {0, 0, -3090, 3090, own_speed_};
+  axes_[1] = {0, 0, -907, 604, own_speed_};
   master_ = ::posix_openpt(O_RDWR | O_NOCTTY);
   if (master_ < 0 || ::grantpt(master_) != 0 || ::unlockpt(master_) != 0)
     throw std::runtime_error("no pseudo terminal");
@@ -43,6 +43,11 @@ double PanTiltEmulator::position(char axis) const {
   return axes_[axis == 'P' ? 0 : 1].position;
 }
 
+double PanTiltEmulator::speed(char axis) const {
+  const std::lock_guard lock(mutex_);
+  return axes_[axis == 'P' ? 0 : 1].speed;
+}
+
 void PanTiltEmulator::refuse(const std::string& message) {
   const std::lock_guard lock(mutex_);
   refusal_ = message;
@@ -54,7 +59,7 @@ void PanTiltEmulator::lose_power(std::chrono::milliseconds silent) {
   boots_ = true;
   echo_ = verbose_ = true;
   command_.clear();
-  for (Axis& axis : axes_) axis.position = 0, axis.target = 0;
+  for (Axis& axis : axes_) axis.position = 0, axis.target = 0, axis.speed = own_speed_;
 }
 
 void PanTiltEmulator::run() {
@@ -115,6 +120,12 @@ std::string PanTiltEmulator::query_result(const Axis& axis, const std::string& n
       return result("Minimum", std::to_string(axis.least));
     case 'X':
       return result("Maximum", std::to_string(axis.most));
+    case 'S':
+      return result("Target speed of", std::to_string(std::lround(axis.speed)));
+    case 'L':
+      return result("Minimum speed of", std::to_string(kSlowest));
+    case 'U':
+      return result("Maximum speed of", std::to_string(kFastest));
     case 'R':
       return "* " + (verbose_ ? fmt::format("Resolution of {} in seconds arc per position is {}", words, kStep_arcsec)
                               : fmt::format("{}", kStep_arcsec));
@@ -136,19 +147,31 @@ std::string PanTiltEmulator::answer_to(const std::string& command) {
   if (command.size() < 2 || (command[0] != 'P' && command[0] != 'T')) return "! Illegal command";
   Axis& axis = axes_[command[0] == 'P' ? 0 : 1];
   if (command.size() == 2) return query_result(axis, command);
-  if (command[1] != 'P') return "! Illegal command";
-  const long target = std::strtol(command.c_str() + 2, nullptr, 10);
-  if (target < axis.least || target > axis.most)
-    return fmt::format("! Maximum allowable position is {}", target < 0 ? axis.least : axis.most);
-  axis.target = target;
+  return execute_on(axis, command[1], command.substr(2));
+}
+
+std::string PanTiltEmulator::execute_on(Axis& axis, char what, const std::string& number) {
+  const long value = std::strtol(number.c_str(), nullptr, 10);
+  if (what == 'S') {
+    if (value < kSlowest || value > kFastest) return "! Speed cannot be set";
+    axis.speed = static_cast<double>(value);
+    return "*";
+  }
+  if (what != 'P') return "! Illegal command";
+  if (value < axis.least || value > axis.most)
+    return fmt::format("! Maximum allowable position is {}", value < 0 ? axis.least : axis.most);
+  axis.target = value;
   return "*";
 }
 
 void PanTiltEmulator::move() {
   const auto now = Clock::now();
-  const double most = steps_per_second_ * std::chrono::duration<double>(now - moved_).count();
+  const double seconds = std::chrono::duration<double>(now - moved_).count();
   moved_ = now;
-  for (Axis& axis : axes_) axis.position += std::clamp(static_cast<double>(axis.target) - axis.position, -most, most);
+  for (Axis& axis : axes_) {
+    const double most = axis.speed * seconds;
+    axis.position += std::clamp(static_cast<double>(axis.target) - axis.position, -most, most);
+  }
 }
 
 void PanTiltEmulator::send(const std::string& text) const {

@@ -14,7 +14,9 @@ namespace spartan::testing {
 /// the right and upwards.
 class PanTiltEmulator {
  public:
-  /// Steps of 185.1428" as the PTU-46; positions ±3090 (pan) and −907 … 604 (tilt).
+  /// Steps of 185.1428" as the PTU-46; positions ±3090 (pan) and −907 … 604 (tilt); speeds that can be set from
+  /// kSlowest to kFastest. `steps_per_second`: of an axis whose speed was not set; not limited, so that tests need not
+  /// wait.
   explicit PanTiltEmulator(double steps_per_second = 20000);
   ~PanTiltEmulator();
   PanTiltEmulator(const PanTiltEmulator&) = delete;
@@ -23,6 +25,7 @@ class PanTiltEmulator {
   /// The device to open.
   const std::string& device() const { return device_; }
   double position(char axis) const;  ///< 'P' or 'T'; steps
+  double speed(char axis) const;     ///< steps per second
 
   /// The next `n` commands get no answer.
   void ignore(int n) { ignored_ = n; }
@@ -34,23 +37,26 @@ class PanTiltEmulator {
   void lose_power(std::chrono::milliseconds silent);
 
   static constexpr double kStep_arcsec = 185.1428;
+  static constexpr long kSlowest = 31, kFastest = 2902;  // steps per second
 
  private:
   struct Axis {
     double position = 0;
     long target = 0, least = 0, most = 0;
+    double speed = 0;
   };
   void run();
   void receive(char c);
   void execute(const std::string& command);
   std::string answer_to(const std::string& command);
+  std::string execute_on(Axis& axis, char what, const std::string& number);
   std::string query_result(const Axis& axis, const std::string& name) const;
   void move();
   void send(const std::string& text) const;
 
   int master_ = -1;
   std::string device_;
-  double steps_per_second_;
+  double own_speed_;  // steps per second
   mutable std::mutex mutex_;
   std::array<Axis, 2> axes_;
   bool echo_ = true, verbose_ = true;

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 namespace spartan::internal {
@@ -46,11 +47,39 @@ std::optional<Answer> answer_in(const std::string& line, const std::string& comm
   return Answer{refused, text};
 }
 
-Result<int> number_in(const std::string& text, const std::string& where) {
-  int value = 0;
+template <class Number>
+Result<Number> number_in(const std::string& text, const std::string& where) {
+  Number value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc() && end == text.data() + text.size()) return value;
-  return failure(ErrorCode::usage, "'" + text + "' is not a whole number", where);
+  constexpr bool is_whole = std::is_integral_v<Number>;
+  return failure(ErrorCode::usage, "'" + text + "' is not a " + (is_whole ? "whole number" : "number"), where);
+}
+
+// Sets what `key` names.
+Status set_part(FlirAddress& address, const std::string& key, const std::string& value, const std::string& text) {
+  if (key == "pan_deg_s" || key == "tilt_deg_s") {
+    const auto speed = number_in<double>(value, text);
+    if (!speed) return failure(speed);
+    if (!(*speed > 0) || !std::isfinite(*speed))
+      return failure(ErrorCode::usage, "the speed " + key + " must be positive", text);
+    (key == "pan_deg_s" ? address.pan_deg_s : address.tilt_deg_s) = *speed;
+    return {};
+  }
+  const auto number = number_in<int>(value, text);
+  if (!number) return failure(number);
+  const bool is_sign = *number == 1 || *number == -1;
+  if (key == "baud") {
+    address.baud = *number;
+  } else if (key == "pan" && is_sign) {
+    address.pan_sign = *number;
+  } else if (key == "tilt" && is_sign) {
+    address.tilt_sign = *number;
+  } else {
+    return failure(ErrorCode::usage, fmt::format("'{}={}' is not possible", key, value), text,
+                   "use baud=RATE, pan=1, pan=-1, tilt=1, tilt=-1, pan_deg_s=SPEED or tilt_deg_s=SPEED");
+  }
+  return {};
 }
 
 }  // namespace
@@ -66,20 +95,8 @@ Result<FlirAddress> parse_flir_address(const std::string& text) {
     const std::string part = rest.substr(0, end);
     rest.erase(0, end + 1);
     const auto equals = std::min(part.find('='), part.size());
-    const std::string key = part.substr(0, equals);
-    const auto value = number_in(part.substr(std::min(equals + 1, part.size())), text);
-    if (!value) return failure(value);
-    const bool is_sign = *value == 1 || *value == -1;
-    if (key == "baud") {
-      address.baud = *value;
-    } else if (key == "pan" && is_sign) {
-      address.pan_sign = *value;
-    } else if (key == "tilt" && is_sign) {
-      address.tilt_sign = *value;
-    } else {
-      return failure(ErrorCode::usage, "'" + part + "' is not possible", text,
-                     "use baud=RATE, pan=1, pan=-1, tilt=1 or tilt=-1");
-    }
+    const std::string value = part.substr(std::min(equals + 1, part.size()));
+    if (Status set = set_part(address, part.substr(0, equals), value, text); !set) return failure(set);
   }
   return address;
 }
@@ -140,20 +157,43 @@ Status FlirPanTilt::connect() {
     if (Status done = command(setting); !done) return done;
   }
   for (Axis& axis : axes_) {
-    const auto ask_axis = [&](char what) { return query(std::string{axis.name, what}); };
-    const auto step = ask_axis('R'), least = ask_axis('N'), most = ask_axis('X'), desired = ask_axis('D');
-    for (const auto* value : {&step, &least, &most, &desired}) {
-      if (!*value) return failure(*value);
-    }
-    if (!(*step > 0) || !(*least < *most))
-      return failure(ErrorCode::read_error, "the pan-tilt unit states impossible steps or limits", line_.device());
-    axis.step_rad = *step * kSecondOfArc_rad;
-    axis.least = std::lround(*least);
-    axis.most = std::lround(*most);
-    axis.target = std::lround(*desired);
+    if (Status done = connect_axis(axis); !done) return done;
   }
   connected_ = true;
   return {};
+}
+
+Status FlirPanTilt::connect_axis(Axis& axis) {
+  const auto ask_axis = [&](char what) { return query(std::string{axis.name, what}); };
+  const auto step = ask_axis('R'), least = ask_axis('N'), most = ask_axis('X'), desired = ask_axis('D');
+  for (const auto* value : {&step, &least, &most, &desired}) {
+    if (!*value) return failure(*value);
+  }
+  if (!(*step > 0) || !(*least < *most))
+    return failure(ErrorCode::read_error, "the pan-tilt unit states impossible steps or limits", line_.device());
+  axis.step_rad = *step * kSecondOfArc_rad;
+  axis.least = std::lround(*least);
+  axis.most = std::lround(*most);
+  axis.target = std::lround(*desired);
+  return set_speed(axis);
+}
+
+// A unit that lost its power has its own speed again.
+Status FlirPanTilt::set_speed(const Axis& axis) {
+  if (axis.deg_s == 0) return {};
+  const auto least = query(std::string{axis.name, 'L'}), most = query(std::string{axis.name, 'U'});
+  for (const auto* value : {&least, &most}) {
+    if (!*value) return failure(*value);
+  }
+  const double step_deg = axis.step_rad / kDegree, steps_s = std::round(axis.deg_s / step_deg);
+  if (!(steps_s >= *least && steps_s <= *most)) {
+    return failure(
+        ErrorCode::usage,
+        fmt::format("a {} speed of {} deg/s is beyond the limits of the pan-tilt unit, {:.1f} to {:.1f} deg/s",
+                    axis.name == 'P' ? "pan" : "tilt", axis.deg_s, *least * step_deg, *most * step_deg),
+        line_.device());
+  }
+  return command(fmt::format("{}S{}", axis.name, std::lround(steps_s)));
 }
 
 Result<long> FlirPanTilt::position_of(const Axis& axis, double angle_rad) const {

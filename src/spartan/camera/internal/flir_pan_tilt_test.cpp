@@ -66,6 +66,43 @@ TEST(FlirPanTilt, SaysThatItMoves) {
   ASSERT_TRUE(settle(*unit));
 }
 
+TEST(FlirPanTilt, GoesAtTheSpeedThatIsWanted) {
+  PanTiltEmulator emulator;
+  const double own = emulator.speed('P');
+  {
+    const auto unit = open(emulator);
+    ASSERT_TRUE(unit);
+    EXPECT_EQ(emulator.speed('P'), own) << "its own, where none is wanted";
+  }
+  auto opened = open_pan_tilt("flir:" + emulator.device() + "?pan_deg_s=50&tilt_deg_s=12.5");
+  ASSERT_TRUE(opened) << opened.error().message();
+  PanTiltControl& unit = **opened;
+  EXPECT_NEAR(emulator.speed('P') * kStep_rad, 50 * kDegree, kStep_rad);
+  EXPECT_NEAR(emulator.speed('T') * kStep_rad, 12.5 * kDegree, kStep_rad);
+  const auto begin = std::chrono::steady_clock::now();
+  ASSERT_TRUE(unit.move_to({20 * kDegree, 0}));
+  ASSERT_TRUE(settle(unit));
+  EXPECT_GT(std::chrono::steady_clock::now() - begin, 380ms) << "20 deg at 50 deg/s";
+
+  emulator.lose_power(10ms);
+  std::this_thread::sleep_for(50ms);
+  EXPECT_EQ(emulator.speed('P'), own);
+  EXPECT_FALSE(settle(unit)) << "it is not where it was sent";
+  ASSERT_TRUE(unit.move_to({5 * kDegree, 0}));
+  EXPECT_NEAR(emulator.speed('P') * kStep_rad, 50 * kDegree, kStep_rad) << "set again";
+}
+
+TEST(FlirPanTilt, KnowsTheLimitsOfItsSpeeds) {
+  const PanTiltEmulator emulator;
+  for (const char* speed : {"pan_deg_s=150", "pan_deg_s=1", "tilt_deg_s=150"}) {
+    const auto unit = open_pan_tilt("flir:" + emulator.device() + "?" + speed);
+    ASSERT_FALSE(unit) << speed;
+    EXPECT_EQ(unit.error().code, ErrorCode::usage);
+    EXPECT_THAT(unit.error().message(), HasSubstr("1.6 to 149.2 deg/s")) << speed;
+  }
+  EXPECT_TRUE(open_pan_tilt("flir:" + emulator.device() + "?pan_deg_s=149&tilt_deg_s=1.6"));
+}
+
 TEST(FlirPanTilt, AxesMayCountToTheOtherSide) {
   const PanTiltEmulator emulator;
   auto unit = open_pan_tilt("flir:" + emulator.device() + "?pan=1&tilt=1&baud=115200");
@@ -152,7 +189,8 @@ TEST(FlirPanTilt, AnUnpluggedLineIsAnError) {
 
 TEST(PanTilt, AddressesAreChecked) {
   for (const char* address : {"/dev/ttyUSB0", "flir:", "flir:?baud=9600", "flir:/dev/x?baud=fast", "flir:/dev/x?pan=2",
-                              "flir:/dev/x?speed=1", "flir:/dev/null?baud=12345"}) {
+                              "flir:/dev/x?speed=1", "flir:/dev/x?pan_deg_s=fast", "flir:/dev/x?tilt_deg_s=-1",
+                              "flir:/dev/x?pan_deg_s=inf", "flir:/dev/x?pan_deg_s=", "flir:/dev/null?baud=12345"}) {
     const auto unit = open_pan_tilt(address);
     ASSERT_FALSE(unit) << address;
     EXPECT_EQ(unit.error().code, ErrorCode::usage) << address;

@@ -21,7 +21,8 @@ void ExposureStage::update(const StereoFrame& frame, const Eigen::Vector3d& up_i
   statistics_.saturated_frames += ground.saturated > ExposureStatistics::kSaturated;
   statistics_.dark_frames += ground.median < ExposureStatistics::kDark * 0.01 * options_.level_percent;
   const double motion_px_s = ground_motion_px_s(rig_, *rig_.find_pair(frame.pair), body_velocity);
-  const auto settings = exposure_.update(ground, {frame.exposure_us, frame.gain}, motion_px_s);
+  const auto settings =
+      exposure_.update(ground, {frame.exposure_us, frame.gain}, motion_px_s, control_.exposure_bounds(frame.pair));
   if (!settings) return;
   ++statistics_.changes;
   const Status set = control_.set_exposure(frame.pair, *settings);

@@ -23,8 +23,8 @@ struct DroppedFrames {
 
 /// Keeps the order of arrival. Where the images would exceed `most_bytes`, the oldest view of another pair than that of
 /// the odometry loses its images; where there is none, the oldest frame of the odometry does. Such a frame is delivered
-/// as MissingFrame (`dropped`). The oldest sensor sample beyond `kMostSensorSamples` is dropped. Thread-safe for one
-/// producer and one consumer.
+/// as MissingFrame (`dropped`; a frame of one image keeps its fault). The oldest sensor sample beyond
+/// `kMostSensorSamples` is dropped. Thread-safe for one producer and one consumer.
 class SampleQueue {
  public:
   SampleQueue(std::string odometry_pair, std::size_t most_bytes)

@@ -86,6 +86,31 @@ TEST(SampleQueue, DropsTheOldestFrameOfTheOdometryWhereThereIsNoView) {
   EXPECT_THAT(drain(queue), ElementsAre("narrow 5")) << "the bytes of what was dropped or taken are free again";
 }
 
+// One camera of a pair is unplugged while processing cannot keep up.
+TEST(SampleQueue, IsBoundedForFramesOfOneImage) {
+  const auto one_image_of = [](const std::string& pair, std::int64_t id) {
+    StereoFrame frame = std::get<StereoFrame>(*frame_of(pair, id).sample);
+    frame.right = FrameImage();
+    return read_of(MissingFrame{id, pair, frame.left_stamp, FrameFault::right_missing, "no right image", frame});
+  };
+  SampleQueue queue("narrow", 2 * kFrameBytes);
+  for (int id = 1; id <= 8; ++id) queue.push(one_image_of("narrow", id));
+  queue.push(one_image_of("wide", 9));
+  queue.push(frame_of("narrow", 10));
+  EXPECT_LE(queue.peak_bytes(), 2 * kFrameBytes);
+  EXPECT_EQ(queue.dropped().views, 1);
+  EXPECT_EQ(queue.dropped().odometry, 6);
+  for (int id = 1; id <= 9; ++id) {
+    const auto read = queue.pop(0s).value();
+    const auto& missing = std::get<MissingFrame>(*read.sample);
+    EXPECT_EQ(missing.frame_id, id);
+    EXPECT_EQ(missing.fault, FrameFault::right_missing);
+    EXPECT_EQ(missing.partial.has_value(), id == 7 || id == 8) << id;
+    EXPECT_THAT(missing.message, HasSubstr(missing.partial ? "no right image" : "the other image was dropped"));
+  }
+  EXPECT_THAT(drain(queue), ElementsAre("narrow 10")) << "a frame of both images is newer";
+}
+
 TEST(SampleQueue, DropsTheOldestSensorSamplesBeyondTheirNumber) {
   SampleQueue queue("narrow", kFrameBytes);
   queue.push(frame_of("narrow", 0));

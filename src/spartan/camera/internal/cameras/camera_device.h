@@ -49,6 +49,8 @@ class CameraDevice {
   virtual Status trigger() = 0;
   /// Codes as trigger().
   virtual Status set_exposure(const ExposureSettings& settings) = 0;
+  /// Of the settings that it takes. Does not wait for the camera.
+  virtual ExposureBounds exposure_bounds() const { return {}; }
 };
 
 }  // namespace spartan::internal

@@ -28,6 +28,12 @@ struct SpartanCameraImage {
   void* token;               // for spartan_camera_release()
 };
 
+/// The settings that a camera takes. A gain is a factor.
+struct SpartanExposureBounds {
+  double shortest_us, longest_us;
+  double smallest_gain, largest_gain;  // both 1: it has no gain
+};
+
 enum SpartanCameraState {
   SPARTAN_CAMERA_IMAGE = 0,
   SPARTAN_CAMERA_NONE_YET = 1,
@@ -53,5 +59,7 @@ int spartan_camera_properties(void* opened);
 // 1: done; 0, with the reason in `message`: not.
 int spartan_camera_trigger(void* opened, char* message, std::size_t size);
 int spartan_camera_set_exposure(void* opened, double exposure_us, double gain, char* message, std::size_t size);
+// 1: `bounds` is filled; 0: the camera does not state them. They do not change while it is open.
+int spartan_camera_exposure_bounds(void* opened, SpartanExposureBounds* bounds);
 void spartan_camera_close(void* opened);
 }

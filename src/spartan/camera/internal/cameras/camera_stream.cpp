@@ -76,6 +76,7 @@ Status CameraStream::open_pair(const StereoPair& pair, const OpenDevice& open) {
     if (!source) return failure(source);
     feed->sources.push_back(std::move(*source));
   }
+  feed->waits = feed->sources.front()->waits();
   feeds_.push_back(std::move(feed));
   return {};
 }
@@ -100,7 +101,7 @@ void CameraStream::start() {
 
 void CameraStream::add(Feed& feed, int side, StampedImage image) {
   std::unique_lock lock(mutex_);
-  if (feed.sources[0]->waits()) {
+  if (feed.waits) {
     changed_.wait(lock, [&] { return feed.pairing.waiting(side) < kMostWaiting || closing_; });
   } else if (feed.pairing.waiting(side) >= kMostWaiting) {
     feed.pairing.drop_oldest(side);
@@ -363,6 +364,15 @@ Status CameraStream::set_exposure(const std::string& pair, const ExposureSetting
     if (Status set = source->set_exposure(settings); !set) all = set;
   }
   return all;
+}
+
+ExposureBounds CameraStream::exposure_bounds(const std::string& pair) const {
+  ExposureBounds bounds;
+  for (const auto& feed : feeds_) {
+    if (feed->pair.name != pair) continue;
+    for (const auto& source : feed->sources) bounds = limit(bounds, source->exposure_bounds());
+  }
+  return bounds;
 }
 
 std::vector<CameraPairReport> CameraStream::camera_reports() const {

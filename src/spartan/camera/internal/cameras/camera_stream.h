@@ -50,6 +50,7 @@ class CameraStream : public SampleStream, public CameraControl {
   /// Null where no camera can be controlled.
   CameraControl* control() override;
   Status set_exposure(const std::string& pair, const ExposureSettings& settings) override;
+  ExposureBounds exposure_bounds(const std::string& pair) const override;
   Status trigger(const std::string& pair) override;
   std::size_t previews(const std::string& pair) const override { return previews_.count(pair); }
   Result<StereoFrame> preview(const std::string& pair, std::size_t index) override;
@@ -62,13 +63,14 @@ class CameraStream : public SampleStream, public CameraControl {
   struct Feed {
     explicit Feed(const CameraStreamOptions& options) : pairing(options.pair_tolerance_s, options.pair_wait) {}
     StereoPair pair;
-    std::vector<std::unique_ptr<ImageSource>> sources;
+    bool waits = false;  // as the first source
     ImagePairing pairing;
     std::array<std::chrono::steady_clock::time_point, 2> newest;  // images, by side
     int alone_in_row = 0;                                         // images, the newest ones
     std::optional<Stamp> last_stamp;
     CameraPairReport report;
     double skew_sum_ms = 0;
+    std::vector<std::unique_ptr<ImageSource>> sources;  // last: their threads, which use the others, end first
   };
 
   CameraStream(const StreamInfo& info, const CameraStreamOptions& options, const Log& log);

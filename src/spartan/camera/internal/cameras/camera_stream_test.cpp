@@ -31,6 +31,7 @@ struct Script {
   std::queue<DeviceRead> reads;
   std::atomic<int> opened = 0, triggers = 0, exposures = 0;
   std::atomic<bool> openable = true;
+  ExposureBounds bounds;
 
   void add(DeviceRead read) {
     const std::lock_guard lock(mutex);
@@ -63,6 +64,7 @@ class ScriptedCamera : public CameraDevice {
     ++script_.exposures;
     return {};
   }
+  ExposureBounds exposure_bounds() const override { return script_.bounds; }
 
  private:
   Script& script_;
@@ -270,6 +272,34 @@ TEST_F(CameraStreamTest, WhatCannotBeDeliveredIsNamedAndCounted) {
   EXPECT_EQ(report.cameras[0].incomplete, 1);
   EXPECT_EQ(report.cameras[1].not_received, 3) << "the one without a partner, and two";
   EXPECT_THAT(describe(report), HasSubstr("1 left images alone"));
+}
+
+TEST_F(CameraStreamTest, CanBeClosedWhileImagesArrive) {
+  for (int round = 0; round < 100; ++round) {
+    for (int i = 0; i < 2000; ++i) deliver(i);
+    auto stream = open(two_cameras());
+    ASSERT_TRUE(stream) << stream.error().message();
+    stream->reset();
+    for (const char* name : {"left", "right"}) {
+      const std::lock_guard lock(scripts[name].mutex);
+      ASSERT_FALSE(scripts[name].reads.empty()) << "all images have arrived before";
+      scripts[name].reads = {};
+    }
+  }
+}
+
+TEST_F(CameraStreamTest, TheBoundsOfAPairAreThoseOfBothCameras) {
+  scripts["left"].bounds = {10, 1e6, 1, 1};
+  scripts["right"].bounds = {20, 1e5, 1.2, 8};
+  deliver(1);
+  auto stream = open(two_cameras());
+  ASSERT_TRUE(stream) << stream.error().message();
+  const ExposureBounds bounds = (*stream)->exposure_bounds("front");
+  EXPECT_EQ(bounds.shortest_us, 20);
+  EXPECT_EQ(bounds.longest_us, 1e5);
+  EXPECT_EQ(bounds.smallest_gain, 1.2) << "no gain suits both: that of the right camera";
+  EXPECT_EQ(bounds.largest_gain, 1.2);
+  EXPECT_EQ((*stream)->exposure_bounds("other").shortest_us, 0);
 }
 
 TEST_F(CameraStreamTest, ACameraThatIsLostIsOpenedAgainWithItsExposure) {

@@ -43,6 +43,7 @@ Result<std::unique_ptr<ImageSource>> ImageSource::create(DeviceRequest request, 
   source->device_ = std::move(*device);
   source->has_controls_ = source->device_->has_controls();
   source->waits_ = source->device_->waits();
+  source->exposure_bounds_ = source->device_->exposure_bounds();
   return source;
 }
 
@@ -81,6 +82,11 @@ bool ImageSource::is_lost() const {
 CameraReport ImageSource::camera_report(std::size_t side) const {
   const std::lock_guard lock(mutex_);
   return reports_[side];
+}
+
+ExposureBounds ImageSource::exposure_bounds() const {
+  const std::lock_guard lock(mutex_);
+  return exposure_bounds_;
 }
 
 Status ImageSource::command(const std::function<void()>& note) {
@@ -225,6 +231,7 @@ void ImageSource::reopen() {
   mapped_ = {};
   const std::lock_guard lock(mutex_);
   device_ = std::move(*device);
+  exposure_bounds_ = device_->exposure_bounds();
   pending_exposure_ = exposure_;
   stop_changed_.notify_all();
 }

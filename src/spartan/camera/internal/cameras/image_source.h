@@ -62,6 +62,8 @@ class ImageSource {
   /// `number`: of the trigger, the same for both cameras of a pair, from kFirstCommanded on.
   Status trigger(std::int64_t number);
   Status set_exposure(const ExposureSettings& settings);
+  /// Of the settings that the device takes, also while it is lost.
+  ExposureBounds exposure_bounds() const;
   /// Of a camera of the request. Triggers and losses count for the first one.
   CameraReport camera_report(std::size_t side) const;
   const DeviceRequest& request() const { return request_; }
@@ -99,6 +101,7 @@ class ImageSource {
   std::condition_variable stop_changed_;
   std::shared_ptr<CameraDevice> device_;  // null: lost
   std::optional<ExposureSettings> exposure_, pending_exposure_;
+  ExposureBounds exposure_bounds_;
   std::deque<std::int64_t> pending_triggers_;  // their numbers
   std::array<CameraReport, 2> reports_;        // by side
   struct Trigger {

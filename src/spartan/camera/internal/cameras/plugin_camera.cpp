@@ -26,6 +26,7 @@ struct CameraPlugin {
   decltype(&spartan_camera_properties) properties = nullptr;
   decltype(&spartan_camera_trigger) trigger = nullptr;
   decltype(&spartan_camera_set_exposure) set_exposure = nullptr;
+  decltype(&spartan_camera_exposure_bounds) exposure_bounds = nullptr;
   decltype(&spartan_camera_close) close = nullptr;
 };
 
@@ -44,6 +45,7 @@ Result<CameraPlugin> load_camera_plugin(bool aravis) {
         library->find("spartan_camera_properties", plugin.properties),
         library->find("spartan_camera_trigger", plugin.trigger),
         library->find("spartan_camera_set_exposure", plugin.set_exposure),
+        library->find("spartan_camera_exposure_bounds", plugin.exposure_bounds),
         library->find("spartan_camera_close", plugin.close)}) {
     if (!found) return failure(found);
   }
@@ -85,6 +87,7 @@ class PluginCamera : public CameraDevice {
                ? Status()
                : refused(message);
   }
+  ExposureBounds exposure_bounds() const override;
 
  private:
   Status refused(const Message& message) const {
@@ -97,6 +100,12 @@ class PluginCamera : public CameraDevice {
   std::string names_;
   std::vector<PixelFormat> formats_;
 };
+
+ExposureBounds PluginCamera::exposure_bounds() const {
+  SpartanExposureBounds bounds{};
+  if (plugin_.exposure_bounds(handle_, &bounds) == 0) return {};
+  return {bounds.shortest_us, bounds.longest_us, bounds.smallest_gain, bounds.largest_gain};
+}
 
 DeviceRead PluginCamera::read(std::chrono::nanoseconds timeout) {
   SpartanCameraImage image{};

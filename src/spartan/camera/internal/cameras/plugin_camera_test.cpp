@@ -81,6 +81,27 @@ class Pipelines : public ::testing::Test {
     return frames;
   }
 
+  // A camera that runs now, at 40 Hz.
+  static std::string running(const std::string& properties = "") {
+    return fmt::format("videotestsrc is-live=true {} ! video/x-raw,format=GRAY8,width={},height={},framerate=40/1",
+                       properties, kWidth, kHeight);
+  }
+
+  static void expect_frames_after_a_loss(SampleStream& stream) {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    std::int64_t losses = 0;
+    while (std::chrono::steady_clock::now() < until) {
+      const auto read = stream.read(std::chrono::milliseconds(100));
+      ASSERT_TRUE(read) << read.error().message();
+      ASSERT_NE(read->state, StreamRead::State::end);
+      const bool frame = read->state == StreamRead::State::sample && std::holds_alternative<StereoFrame>(*read->sample);
+      if (frame && losses > 0) return;
+      // Frames from before the loss may still wait to be read.
+      if (read->state == StreamRead::State::none_yet) losses = stream.camera_reports()[0].cameras[0].losses;
+    }
+    FAIL() << losses << " losses, and no frame after them";
+  }
+
   static void expect_patterns(const std::vector<StereoFrame>& frames) {
     ASSERT_EQ(frames.size(), static_cast<std::size_t>(kImages));
     for (int i = 0; i < kImages; ++i) {
@@ -130,6 +151,19 @@ TEST_F(Pipelines, ASideBySideImageIsCutInTwo) {
   }
 }
 
+TEST_F(Pipelines, TakeACalibrationInAnyFormat) {
+  OpenOptions options;
+  options.rig_file = folder.file("calib.txt");
+  ASSERT_TRUE(write_file_atomically(
+      options.rig_file, fmt::format("cam0=[50 0 32.5; 0 50 23.5; 0 0 1]\ncam1=[50 0 32.5; 0 50 23.5; 0 0 1]\n"
+                                    "doffs=0\nbaseline=100\nwidth={}\nheight={}\n",
+                                    kWidth, kHeight)));
+  auto stream = open_live_stream(
+      "gst:" + images_of(0) + " ! appsink name=left " + images_of(1) + " ! appsink name=right", options, {});
+  ASSERT_TRUE(stream) << stream.error().message();
+  expect_patterns(frames_of(**stream));
+}
+
 TEST_F(Pipelines, DeliverTheFormatOfTheRig) {
   const auto source = [](const char* caps) {
     return fmt::format("videotestsrc num-buffers=5 ! {},width={},height={},framerate=50/1 ! appsink name=left", caps,
@@ -155,6 +189,32 @@ TEST_F(Pipelines, DeliverTheFormatOfTheRig) {
       const auto [darkest, brightest] = std::minmax_element(&view(0, y), &view(0, y) + kWidth);
       EXPECT_GT(*brightest, *darkest) << y;
     }
+  }
+}
+
+// One of two cameras fails while the other one goes on.
+TEST_F(Pipelines, TheLossOfOneOfTwoCamerasIsNoticed) {
+  auto stream =
+      open(running() + " ! appsink name=left " + running() + " ! identity error-after=40 ! appsink name=right");
+  ASSERT_TRUE(stream) << stream.error().message();
+  expect_frames_after_a_loss(**stream);
+}
+
+TEST_F(Pipelines, TheEndOfACameraIsALossAndThatOfAFileIsTheEnd) {
+  auto stream = open(running("num-buffers=40") +
+                     " ! tee name=both ! queue ! appsink name=left both. ! queue ! appsink "
+                     "name=right");
+  ASSERT_TRUE(stream) << stream.error().message();
+  expect_frames_after_a_loss(**stream);
+  auto one_ends = open(running() + " ! appsink name=left " + running("num-buffers=40") + " ! appsink name=right");
+  ASSERT_TRUE(one_ends) << one_ends.error().message();
+  expect_frames_after_a_loss(**one_ends);
+  for (const std::string pace : {" ! appsink name=", " ! identity sync=true ! appsink name="}) {
+    auto file = open(images_of(0) + pace + "left " + images_of(1) + pace + "right");
+    ASSERT_TRUE(file) << file.error().message();
+    EXPECT_FALSE(frames_of(**file).empty());
+    EXPECT_EQ((*file)->read(std::chrono::seconds(10))->state, StreamRead::State::end) << pace;
+    EXPECT_EQ((*file)->camera_reports()[0].cameras[0].losses, 0) << pace;
   }
 }
 
@@ -185,6 +245,7 @@ TEST(CameraAddresses, AreChecked) {
   EXPECT_THAT(error("aravis:one", rig), HasSubstr("aravis:LEFT,RIGHT"));
   EXPECT_THAT(error("aravis:one,", rig), HasSubstr("aravis:LEFT,RIGHT"));
   EXPECT_THAT(error("live:" + rig, ""), HasSubstr("no camera has a driver"));
+  EXPECT_THAT(error("live:" + rig, "other.yaml"), HasSubstr("omit --rig, or use live:other.yaml"));
   EXPECT_THAT(error("live:" + rig + ".missing", ""), HasSubstr("rig.yaml.missing"));
   EXPECT_THAT(error("v4l:0", rig), HasSubstr("is not the address of a live stream"));
   ASSERT_TRUE(write_file_atomically(rig, rig_text("driver: {source: 'v4l:0'},")));
