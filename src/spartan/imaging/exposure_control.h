@@ -101,7 +101,7 @@ class ExposureControl {
 
  private:
   double brightness_factor(const GroundBrightness& ground) const;
-  ExposureSettings split(double product_us, double motion_px_s, const ExposureBounds& bounds) const;
+  ExposureSettings split(double product_us, double motion_px_s, const ExposureBounds& cameras) const;
 
   ExposureOptions options_;
 };

@@ -210,7 +210,7 @@ TEST_F(Pipelines, TheEndOfACameraIsALossAndThatOfAFileIsTheEnd) {
   ASSERT_TRUE(one_ends) << one_ends.error().message();
   expect_frames_after_a_loss(**one_ends);
   for (const std::string pace : {" ! appsink name=", " ! identity sync=true ! appsink name="}) {
-    auto file = open(images_of(0) + pace + "left " + images_of(1) + pace + "right");
+    auto file = open(fmt::format("{0}{2}left {1}{2}right", images_of(0), images_of(1), pace));
     ASSERT_TRUE(file) << file.error().message();
     EXPECT_FALSE(frames_of(**file).empty());
     EXPECT_EQ((*file)->read(std::chrono::seconds(10))->state, StreamRead::State::end) << pace;
