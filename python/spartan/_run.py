@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from spartan import _core
+from spartan._errors import Error
 
 StrPath = str | os.PathLike[str]
 
@@ -171,6 +172,6 @@ def run(
         page.parent.mkdir(exist_ok=True)
         try:
             _core.write_report(output, input, reading, page, truth, threads)
-        except _core.Error as error:
+        except Error as error:
             logging.getLogger("spartan").warning("no report was written: %s", error)
     return finished

@@ -265,7 +265,7 @@ def test_images_of_any_names(drive, tmp_path):
     with pytest.raises(spartan.Error):
         run.export("colmap", tmp_path / "none", recording=images)
     run.export("colmap", tmp_path / "model", recording=spartan.open_recording(images, **reading))
-    assert pycolmap.Reconstruction(tmp_path / "model" / "sparse" / "0").num_images() == 4
+    assert pycolmap.Reconstruction(tmp_path / "model" / "sparse" / "0").num_images() == 8  # left and right
 
 
 def test_a_report_that_fails_does_not_fail_the_run(drive, tmp_path, caplog):

@@ -92,6 +92,10 @@ class RecordingWriter {
 /// nothing to a finished one. Codes: those of reading and writing files.
 Status finish_interrupted_recording(const std::string& folder, const StreamInfo& info);
 
+/// Copies the images of self-masks, whose names are relative to the folder `from`, to masks/CAMERA.EXTENSION of the
+/// folder `to`. Returns the rig with these names. Codes: `configuration` (a mask is missing or unreadable), `output`.
+Result<Rig> with_self_masks_in(const std::string& to, Rig rig, const std::string& from);
+
 /// How far a StreamRecorder has come.
 struct RecorderProgress {
   std::int64_t frames = 0, sensor_samples = 0;  ///< written

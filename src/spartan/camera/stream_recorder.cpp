@@ -7,7 +7,6 @@
 #include <utility>
 #include <variant>
 
-#include "spartan/camera/internal/self_masks.h"
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
@@ -51,8 +50,7 @@ Result<std::unique_ptr<StreamRecorder>> StreamRecorder::create(const std::string
   rig.imu.body_from_imu = Pose::from_translation(rig.imu.body_from_imu.translation());
   auto writer = RecordingWriter::create_batched(folder, rig, recording_options_of(info), images);
   if (!writer) return failure(writer);
-  const auto stored =
-      internal::with_self_masks_in(folder, rig, std::filesystem::path(info.rig_source).parent_path().string());
+  const auto stored = with_self_masks_in(folder, rig, std::filesystem::path(info.rig_source).parent_path().string());
   if (!stored) return failure(stored);
   if (Status s = write_file_atomically(folder + "/rig.yaml", to_rig_yaml(*stored)); !s) return failure(s);
   return std::unique_ptr<StreamRecorder>(new StreamRecorder(std::make_unique<State>(std::move(*writer))));

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "spartan/calibration_io/calibration_files.h"
-#include "spartan/camera/internal/self_masks.h"
+#include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
 #include "spartan/core/stage_clock.h"
 #include "spartan/core/trajectory.h"

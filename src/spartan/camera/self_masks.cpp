@@ -1,10 +1,10 @@
-#include "spartan/camera/internal/self_masks.h"
-
+// Self-masks of a rig that is stored elsewhere.
 #include <filesystem>
 
+#include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
 
-namespace spartan::internal {
+namespace spartan {
 
 namespace fs = std::filesystem;
 
@@ -25,4 +25,4 @@ Result<Rig> with_self_masks_in(const std::string& to, Rig rig, const std::string
   return rig;
 }
 
-}  // namespace spartan::internal
+}  // namespace spartan
