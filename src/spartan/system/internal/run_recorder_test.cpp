@@ -219,7 +219,7 @@ TEST_F(RunRecorderTest, FramesDoNotWaitForTheRecording) {
   const auto recorder = open(commit, Pace::live);
   std::atomic<bool> hangs = true;
   RunResult result = frame_result(0);
-  result.checkpoint.emplace();
+  result.checkpoint = RunStore::Checkpoint{};
   result.before_checkpoint = [&] {
     while (hangs) std::this_thread::sleep_for(1ms);
   };
