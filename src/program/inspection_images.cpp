@@ -143,8 +143,7 @@ Result<std::vector<ImagePair>> load_frames(Recording& source, const std::string&
                                            const ThreadPool& workers) {
   ImagingOptions options;
   options.rectify = false;
-  const std::string masks = std::filesystem::path(source.info().rig_source).parent_path().string();
-  auto imager = Imager::create(source.info().rig, options, workers, masks);
+  auto imager = Imager::create(source.info().rig, options, workers, source.info().mask_folder());
   if (!imager) return failure(imager);
   const std::vector<Stamp> stamps = source.listed_stamps(pair);
   std::vector<ImagePair> pairs;

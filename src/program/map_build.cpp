@@ -127,7 +127,7 @@ Result<Stop> load_stop(const Context& context, const BuildArguments& a) {
   const RecordingInfo& info = (*source)->info();
   Stop stop;
   stop.rig = info.rig;
-  stop.mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
+  stop.mask_folder = info.mask_folder();
   const auto listed = frames_to_map(**source, a);
   if (!listed) return failure(listed);
   const std::vector<FrameKey>& frames_of_stop = *listed;

@@ -32,6 +32,9 @@ struct StreamInfo {
   std::optional<double> gravity_m_s2;  ///< from recording.yaml
   SensorNoise noise;                   ///< specified noise, from recording.yaml or imu0/sensor.yaml
   bool has_imu = false;
+
+  /// The folder of the rig's file, to which the names of its self-masks are relative.
+  std::string mask_folder() const;
 };
 
 /// Sensor samples (not frames) that a stream has discarded so far.

@@ -1,12 +1,17 @@
-// Self-masks of a rig that is stored elsewhere.
+// Where the self-masks of a rig are, and their copies beside a rig that is stored elsewhere.
 #include <filesystem>
 
 #include "spartan/camera/recording_writer.h"
+#include "spartan/camera/sample_stream.h"
 #include "spartan/core/files.h"
 
 namespace spartan {
 
 namespace fs = std::filesystem;
+
+std::string StreamInfo::mask_folder() const {
+  return fs::path(rig_source).parent_path().string();
+}
 
 Result<Rig> with_self_masks_in(const std::string& to, Rig rig, const std::string& from) {
   for (Camera& camera : rig.cameras) {

@@ -1,6 +1,5 @@
 #include <condition_variable>
 #include <deque>
-#include <filesystem>
 #include <mutex>
 #include <new>
 #include <thread>
@@ -50,7 +49,7 @@ Result<std::unique_ptr<StreamRecorder>> StreamRecorder::create(const std::string
   rig.imu.body_from_imu = Pose::from_translation(rig.imu.body_from_imu.translation());
   auto writer = RecordingWriter::create_batched(folder, rig, recording_options_of(info), images);
   if (!writer) return failure(writer);
-  const auto stored = with_self_masks_in(folder, rig, std::filesystem::path(info.rig_source).parent_path().string());
+  const auto stored = with_self_masks_in(folder, rig, info.mask_folder());
   if (!stored) return failure(stored);
   if (Status s = write_file_atomically(folder + "/rig.yaml", to_rig_yaml(*stored)); !s) return failure(s);
   return std::unique_ptr<StreamRecorder>(new StreamRecorder(std::make_unique<State>(std::move(*writer))));

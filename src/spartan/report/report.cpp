@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <utility>
 #include <vector>
 
@@ -103,8 +102,7 @@ Result<std::string> make_report(ReportRequest request) {
   if (!source) return failure(source);
   const RecordingInfo& info = (*source)->info();
   if (request.truth.empty()) request.truth = info.truth_file;
-  const std::string masks = std::filesystem::path(info.rig_source).parent_path().string();
-  auto imager = Imager::create(info.rig, request.options.imaging, ThreadPool(request.threads), masks);
+  auto imager = Imager::create(info.rig, request.options.imaging, ThreadPool(request.threads), info.mask_folder());
   if (!imager) return failure(imager);
   auto global_map = global_map_figures(request.run, *store, heading_east);
   if (!global_map) return failure(global_map);

@@ -289,8 +289,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
-  const auto stored_rig =
-      with_self_masks_in(folder.path, rig, std::filesystem::path(info.rig_source).parent_path().string());
+  const auto stored_rig = with_self_masks_in(folder.path, rig, info.mask_folder());
   if (!stored_rig) return failure(stored_rig);
   if (Status s = write_file_atomically(folder.rig(), to_rig_yaml(*stored_rig)); !s) return failure(s);
 
@@ -310,9 +309,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   SampleStream& live = source.queue ? *source.queue : source.stream;
   std::optional<ExposureStage> exposure;
   if (live.control() != nullptr && options.exposure.enabled) {
-    auto created =
-        ExposureStage::create(rig, options.exposure, std::filesystem::path(info.rig_source).parent_path().string(),
-                              *live.control(), hooks.log);
+    auto created = ExposureStage::create(rig, options.exposure, info.mask_folder(), *live.control(), hooks.log);
     if (!created) return failure(created);
     exposure.emplace(std::move(*created));
   }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <utility>
 
@@ -52,8 +51,7 @@ Result<AlignedRig> align_rows_of(SampleStream& source, const ThreadPool& workers
   AlignedRig result{source.info().rig, {}};
   ImagingOptions options;
   options.rectify = false;
-  const std::string masks = std::filesystem::path(source.info().rig_source).parent_path().string();
-  auto imager = Imager::create(result.rig, options, workers, masks);
+  auto imager = Imager::create(result.rig, options, workers, source.info().mask_folder());
   if (!imager) return failure(imager);
   std::vector<CorrectedPair> corrected;
   std::map<std::string, std::string> sentences;  // by pair

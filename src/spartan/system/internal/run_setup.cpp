@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <utility>
 
 #include "spartan/core/pose.h"
@@ -72,7 +71,7 @@ Result<RunSetup> set_up_again(const RunIdentity& before, const std::string& mask
 Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, const ThreadPool& workers, Pace pace,
                             const RunIdentity* before) {
   const StreamInfo& info = source.info();
-  const std::string mask_folder = std::filesystem::path(info.rig_source).parent_path().string();
+  const std::string mask_folder = info.mask_folder();
   RunOptions options = options_of(source, request);
   auto pipeline = Pipeline::create(info.rig, options, workers, mask_folder, pace);
   if (!pipeline) return failure(pipeline);

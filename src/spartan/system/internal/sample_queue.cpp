@@ -19,12 +19,6 @@ std::size_t bytes_of(const Sample& sample) {
   return missing != nullptr && missing->partial ? bytes_of(*missing->partial) : 0;
 }
 
-// Of a frame.
-const std::string& pair_of(const Sample& sample) {
-  const auto* frame = std::get_if<StereoFrame>(&sample);
-  return frame != nullptr ? frame->pair : std::get<MissingFrame>(sample).pair;
-}
-
 bool is_frame(const Sample& sample) {
   return std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);
 }
@@ -59,7 +53,7 @@ bool SampleQueue::drop_oldest(bool view) {
   const std::string reason = fmt::format("dropped: {} MB of images waited to be processed", most_bytes_ >> 20U);
   for (StreamRead& read : reads_) {
     const std::size_t bytes = bytes_of(*read.sample);
-    if (bytes == 0 || (pair_of(*read.sample) != odometry_pair_) != view) continue;
+    if (bytes == 0 || (source_of(*read.sample) != odometry_pair_) != view) continue;
     if (auto* const missing = std::get_if<MissingFrame>(&*read.sample)) {
       missing->partial.reset();
       missing->message += "; the other image was " + reason;
