@@ -42,6 +42,13 @@ std::string source_of(const Sample& sample) {
   return std::holds_alternative<CompassSample>(sample) ? ":compass" : ":inclinometer";
 }
 
+std::size_t image_bytes(const Sample& sample) {
+  const auto* frame = std::get_if<StereoFrame>(&sample);
+  const auto* missing = std::get_if<MissingFrame>(&sample);
+  if (missing != nullptr && missing->partial) frame = &*missing->partial;
+  return frame != nullptr ? frame->left.bytes() + frame->right.bytes() : 0;
+}
+
 void move_stamps(Sample& sample, std::int64_t by_ns) {
   const auto move_frame = [&](StereoFrame& frame) {
     frame.left_stamp.ns += by_ns;

@@ -147,6 +147,8 @@ Stamp stamp_of(const Sample& sample);
 /// What a sample is one of: the name of the pair, or "imu", "wheels", "compass" or "inclinometer" with a leading colon,
 /// which no name of a pair has.
 std::string source_of(const Sample& sample);
+/// Of the images of a sample, one that is alone included.
+std::size_t image_bytes(const Sample& sample);
 /// Adds a time to all stamps of a sample.
 void move_stamps(Sample& sample, std::int64_t by_ns);
 

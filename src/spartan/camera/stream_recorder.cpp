@@ -15,13 +15,6 @@ namespace {
 
 constexpr std::chrono::seconds kSyncEvery{1};
 
-std::size_t bytes_of(const Sample& sample) {
-  const auto* frame = std::get_if<StereoFrame>(&sample);
-  const auto* missing = std::get_if<MissingFrame>(&sample);
-  if (missing != nullptr && missing->partial) frame = &*missing->partial;
-  return frame != nullptr ? frame->left.bytes() + frame->right.bytes() : 0;
-}
-
 }  // namespace
 
 struct StreamRecorder::State {
@@ -66,7 +59,7 @@ StreamRecorder::~StreamRecorder() {
 void StreamRecorder::add(const Sample& sample) {
   const auto* missing = std::get_if<MissingFrame>(&sample);
   if (missing != nullptr && !missing->partial) return;
-  const std::size_t bytes = bytes_of(sample);
+  const std::size_t bytes = image_bytes(sample);
   {
     const std::lock_guard lock(state_->mutex);
     if (!state_->progress.status) return;
@@ -155,7 +148,7 @@ Status StreamRecorder::State::write_all(std::deque<Sample> samples) {
     const Sample& sample = samples.front();
     const bool is_frame = std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);
     const std::lock_guard lock(mutex);
-    bytes -= bytes_of(samples.front());
+    bytes -= image_bytes(samples.front());
     if (written) {
       ++(is_frame ? progress.frames : progress.sensor_samples);
     } else if (written.error().code == ErrorCode::input) {

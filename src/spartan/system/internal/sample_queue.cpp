@@ -9,16 +9,6 @@
 namespace spartan::internal {
 namespace {
 
-std::size_t bytes_of(const StereoFrame& frame) {
-  return frame.left.bytes() + frame.right.bytes();
-}
-
-std::size_t bytes_of(const Sample& sample) {
-  if (const auto* frame = std::get_if<StereoFrame>(&sample)) return bytes_of(*frame);
-  const auto* missing = std::get_if<MissingFrame>(&sample);
-  return missing != nullptr && missing->partial ? bytes_of(*missing->partial) : 0;
-}
-
 bool is_frame(const Sample& sample) {
   return std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);
 }
@@ -28,7 +18,7 @@ bool is_frame(const Sample& sample) {
 void SampleQueue::push(StreamRead read) {
   {
     const std::lock_guard lock(mutex_);
-    bytes_ += bytes_of(*read.sample);
+    bytes_ += image_bytes(*read.sample);
     if (!is_frame(*read.sample)) ++sensor_samples_;
     reads_.push_back(std::move(read));
     make_room();
@@ -52,7 +42,7 @@ void SampleQueue::make_room() {
 bool SampleQueue::drop_oldest(bool view) {
   const std::string reason = fmt::format("dropped: {} MB of images waited to be processed", most_bytes_ >> 20U);
   for (StreamRead& read : reads_) {
-    const std::size_t bytes = bytes_of(*read.sample);
+    const std::size_t bytes = image_bytes(*read.sample);
     if (bytes == 0 || (source_of(*read.sample) != odometry_pair_) != view) continue;
     if (auto* const missing = std::get_if<MissingFrame>(&*read.sample)) {
       missing->partial.reset();
@@ -87,7 +77,7 @@ Result<StreamRead> SampleQueue::pop(std::chrono::nanoseconds timeout) {
   if (reads_.empty()) return StreamRead{StreamRead::State::end, {}, now};
   StreamRead read = std::move(reads_.front());
   reads_.pop_front();
-  bytes_ -= bytes_of(*read.sample);
+  bytes_ -= image_bytes(*read.sample);
   if (!is_frame(*read.sample)) --sensor_samples_;
   return read;
 }
