@@ -65,12 +65,14 @@ std::optional<Pose> Pipeline::State::predicted_motion(const RectifiedPair& recti
   return reference.left_from_body * exp_se3(velocity * seconds) * rectified.body_from_left;
 }
 
-// The same motion by the other sensors, where the localization has samples up to the frame.
+// The same motion by the other sensors, where the localization has samples up to the frame. Live, it has later ones.
 std::optional<Pose> Pipeline::State::motion_by_sensors(const RectifiedPair& rectified) const {
   if (!started || options.odometry_only) return std::nullopt;
-  const LocalizationEstimate now = localizer.estimate();
-  if (!(std::abs(seconds_between(now.stamp, rectified.stamp)) < kLatestSample_s)) return std::nullopt;
-  const Pose body_motion = reference.odom_from_body.inverse() * now.odom_from_body.pose;
+  const Stamp newest = localizer.estimate().stamp;
+  if (!(seconds_between(newest, rectified.stamp) < kLatestSample_s)) return std::nullopt;
+  const auto then = localizer.estimate_at(rectified.stamp);
+  if (!then) return std::nullopt;
+  const Pose body_motion = reference.odom_from_body.inverse() * then->odom_from_body.pose;
   return reference.left_from_body * body_motion * rectified.body_from_left;
 }
 

@@ -52,20 +52,24 @@ TEST(PipelineFaults, AMissingImageCostsLittle) {
   }
 }
 
-// The rover turns by 46° while a dark frame is lost. Without the IMU the landmarks would not be found again.
+// The rover turns by 46° while a dark frame is lost. Without the IMU the landmarks would not be found again. Live, its
+// samples come before an image of the same time.
 TEST(PipelineFaults, SensorsBridgeALostFrame) {
   constexpr double kRate_rad_s = 0.4;
   const Pose turned = world_from_body(4) * Pose(exp_so3({0, 0, 2 * kRate_rad_s}), {0, 0, 0});
   const testing::SyntheticWorld world(testing::SyntheticWorldOptions{});
   const SyntheticFrame images = world.render(kStereo, turned * rover().body_from_camera("left"), 4);
   const Image<std::uint8_t> dark(320, 240, 2);
-  for (const bool with_imu : {false, true}) {
+  constexpr int kNone = -1;
+  for (const int samples_ahead : {kNone, 0, 8}) {
+    SCOPED_TRACE(samples_ahead);
+    const bool with_imu = samples_ahead != kNone;
     Pipeline pipeline = pipeline_of();
     if (with_imu) pipeline.add(CompassSample{{-10'000'000LL}, 0.8, 0.01});  // the pose at the start is not the identity
     Pose first;
     int samples = -100;
     for (int i = 0; i < 5; ++i) {
-      for (; with_imu && samples <= 100 * i; ++samples) {
+      for (; with_imu && samples <= 100 * i + (i > 0 ? samples_ahead : 0); ++samples) {
         const double rate = samples > 200 ? kRate_rad_s : 0;
         const double noise = 1e-4 * (samples % 7);  // an IMU that repeats its readings is excluded
         pipeline.add(ImuSample{{samples * 10'000'000LL}, {noise, 0, rate}, {0, noise, 9.81}});

@@ -134,6 +134,17 @@ TEST(PipelineKeyframes, PendingKeyframeContinuesFromRestoredState) {
   }
 }
 
+TEST(PipelineKeyframes, LiveFramesDoNotWaitWithoutADelay) {
+  RunOptions options = keyframe_options();
+  options.keyframes.delay_frames = 0;
+  Pipeline live = Pipeline::create(narrow_rover(), options, ThreadPool(1), {}, Pace::live).value();
+  ASSERT_TRUE(live.add(narrow_frame(0)));
+  EXPECT_FALSE(live.add(narrow_frame(1)).value()->stop) << "its map is begun at this frame";
+  const auto last = live.finish_stop().value();
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->stamp, Stamp());
+}
+
 TEST(PipelineKeyframes, MayBeAbandonedAtAnyFrame) {
   for (int frames = 1; frames < kDriven; ++frames) {
     Pipeline pipeline = narrow_pipeline(2);

@@ -59,10 +59,11 @@ Status Pipeline::State::add_view(const StereoFrame& frame) {
 }
 
 // The global map does not change while a match is made, so the part of it that the map will be matched to is taken
-// before, by the thread that may read the store.
+// before, by the thread that may read the store. A keyframe without a delay is mapped where it is applied, but live no
+// frame waits for it.
 Status Pipeline::State::start_maps() {
   if (Status status = start_stop_match(); !status) return status;
-  return keyframe_stage.is_ready() ? Status() : start_keyframe_map();
+  return keyframe_stage.is_ready() && pace == Pace::recorded ? Status() : start_keyframe_map();
 }
 
 Status Pipeline::State::start_stop_match() {
@@ -83,7 +84,7 @@ Result<std::optional<MappedStop>> Pipeline::State::apply_due_map(bool leaves_sto
     auto stop = finish_departed_stop();
     if (!stop) return failure(stop);
     applied = std::move(*stop);
-  } else if (keyframe_stage.is_ready() && (!keyframe_map || is_made(keyframe_map->ticket))) {
+  } else if (keyframe_stage.is_ready() && (pace == Pace::recorded || is_made(keyframe_map->ticket))) {
     auto map = finish_keyframe();
     if (!map) return failure(map);
     applied = std::move(*map);
