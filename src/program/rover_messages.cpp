@@ -65,7 +65,7 @@ std::string health_message(const FrameRecord& frame) {
   return line_of(json);
 }
 
-std::string map_message(const MappedStop& stop) {
+std::string map_message(const MappedStop& stop, bool has_files) {
   Json json = message("map", stop.stamp);
   json["position_id"] = stop.position_id;
   json["views"] = stop.views;
@@ -73,7 +73,7 @@ std::string map_message(const MappedStop& stop) {
   json["overlap"] = number(stop.merged.match.overlap);
   json["obstacles"] = stop.merged.local.obstacles.size();
   json["world_from_body"] = pose_of(stop.merged.corrected);
-  json["file"] = RunFolder{"."}.local_map(stop.stamp).substr(2) + ".tif";
+  json["file"] = has_files ? Json(RunFolder{"."}.local_map(stop.stamp).substr(2) + ".tif") : Json(nullptr);
   return line_of(json);
 }
 

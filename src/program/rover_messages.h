@@ -14,8 +14,8 @@ namespace spartan::program {
 std::string pose_message(const LocalizationEstimate& estimate);
 /// `type` "health": the odometry and the sensors at a frame.
 std::string health_message(const FrameRecord& frame);
-/// `type` "map": the map of a stop or keyframe that was applied; its file is written afterwards.
-std::string map_message(const MappedStop& stop);
+/// `type` "map": the map of a stop or keyframe that was applied; `file` is null where its files could not be written.
+std::string map_message(const MappedStop& stop, bool has_files);
 /// `type` "panorama": one begins or has ended.
 std::string panorama_message(const PanoramaEvent& event);
 

@@ -120,8 +120,9 @@ class StreamRecorder {
   void add(const Sample& sample);
   /// Number of samples that were added.
   std::int64_t added() const;
-  /// Waits until the first `count` samples are on disk and listed, or writing has ended.
-  void wait_until_synced(std::int64_t count);
+  /// Whether the first `count` samples are on disk and listed, or writing has ended; otherwise they will be synced as
+  /// soon as they are written.
+  bool is_synced(std::int64_t count);
   /// Waits until everything is on disk, and finishes the recording. Codes: `output`, `resources`.
   Status finish();
   RecorderProgress progress() const;

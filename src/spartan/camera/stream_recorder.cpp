@@ -1,7 +1,9 @@
+#include <algorithm>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
 #include <new>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <variant>
@@ -20,18 +22,23 @@ constexpr std::chrono::seconds kSyncEvery{1};
 struct StreamRecorder::State {
   explicit State(RecordingWriter writer_in) : writer(std::move(writer_in)) {}
 
+  struct Waiting {
+    Sample sample;
+    std::int64_t number;  // of all samples that were added, from 1
+  };
+
   RecordingWriter writer;  // of the thread, until it has ended
   mutable std::mutex mutex;
   std::condition_variable changed;
-  std::deque<Sample> waiting;
+  std::deque<Waiting> waiting;
   std::size_t bytes = 0;
-  bool ended = false, sync_now = false;
-  std::int64_t added = 0, synced = 0;  // samples
+  bool ended = false;
+  std::int64_t added = 0, written = 0, synced = 0, sync_at = 0;  // numbers of samples
   RecorderProgress progress;
   std::thread thread;
 
   void run();
-  Status write_all(std::deque<Sample> samples);
+  Status write_counted(const Sample& sample);
   Status write(const Sample& sample);
 };
 
@@ -69,7 +76,7 @@ void StreamRecorder::add(const Sample& sample) {
       return;
     }
     state_->bytes += bytes;
-    state_->waiting.push_back(sample);
+    state_->waiting.push_back({sample, state_->added});
   }
   state_->changed.notify_all();
 }
@@ -93,11 +100,12 @@ std::int64_t StreamRecorder::added() const {
   return state_->added;
 }
 
-void StreamRecorder::wait_until_synced(std::int64_t count) {
-  std::unique_lock lock(state_->mutex);
-  state_->sync_now = state_->synced < count;
+bool StreamRecorder::is_synced(std::int64_t count) {
+  const std::lock_guard lock(state_->mutex);
+  if (state_->synced >= count || state_->ended || !state_->progress.status) return true;
+  state_->sync_at = std::max(state_->sync_at, count);
   state_->changed.notify_all();
-  state_->changed.wait(lock, [&] { return state_->synced >= count || state_->ended || !state_->progress.status; });
+  return false;
 }
 
 RecorderProgress StreamRecorder::progress() const {
@@ -105,59 +113,55 @@ RecorderProgress StreamRecorder::progress() const {
   return state_->progress;
 }
 
+// One sample at a time: a sync that is due does not wait for all that a slow disk has before it.
 void StreamRecorder::State::run() {
   auto next_sync = std::chrono::steady_clock::now() + kSyncEvery;
+  std::unique_lock lock(mutex);
   for (;;) {
-    std::deque<Sample> samples;
-    bool last = false, sync = false;
-    std::int64_t taken = 0;
-    {
-      std::unique_lock lock(mutex);
-      changed.wait_until(lock, next_sync, [this] { return ended || sync_now || !waiting.empty(); });
-      samples.swap(waiting);
-      last = ended;
-      sync = std::exchange(sync_now, false) || std::chrono::steady_clock::now() >= next_sync;
-      taken = added;
+    const auto sync_wanted = [this] { return sync_at > synced && written >= sync_at; };
+    changed.wait_until(lock, next_sync, [&] { return ended || sync_wanted() || !waiting.empty(); });
+    std::optional<Waiting> next;
+    if (!waiting.empty()) {
+      next = std::move(waiting.front());
+      waiting.pop_front();
     }
+    const bool sync = sync_wanted() || std::chrono::steady_clock::now() >= next_sync;
+    lock.unlock();
     Status status;
     try {
-      status = write_all(std::move(samples));
-      if (status && sync) {
-        status = writer.sync();
-        next_sync = std::chrono::steady_clock::now() + kSyncEvery;
-      }
+      if (next) status = write_counted(next->sample);
+      if (status && sync) status = writer.sync();
     } catch (const std::bad_alloc& exception) {
       status = tl::unexpected(out_of_memory(exception));
     }
-    const std::lock_guard lock(mutex);
+    if (sync) next_sync = std::chrono::steady_clock::now() + kSyncEvery;
+    const std::int64_t number = next ? next->number : 0;
+    const std::size_t freed = next ? image_bytes(next->sample) : 0;
+    next.reset();
+    lock.lock();
+    bytes -= freed;
     if (!status) progress.status = status;
-    if (status && sync) synced = taken;
-    if (status && !last) {
-      changed.notify_all();
-      continue;
-    }
-    waiting.clear();
+    // Those that did not fit into the queue are not waited for.
+    written = waiting.empty() ? added : waiting.front().number - 1;
+    if (status && sync) synced = number > 0 ? number : written;
     changed.notify_all();
+    if (status && !(ended && waiting.empty())) continue;
+    waiting.clear();
     return;
   }
 }
 
-Status StreamRecorder::State::write_all(std::deque<Sample> samples) {
-  for (; !samples.empty(); samples.pop_front()) {
-    Status written = write(samples.front());
-    const Sample& sample = samples.front();
-    const bool is_frame = std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);
-    const std::lock_guard lock(mutex);
-    bytes -= image_bytes(samples.front());
-    if (written) {
-      ++(is_frame ? progress.frames : progress.sensor_samples);
-    } else if (written.error().code == ErrorCode::input) {
-      ++progress.rejected;
-    } else {
-      return written;
-    }
+Status StreamRecorder::State::write_counted(const Sample& sample) {
+  const Status status = write(sample);
+  const bool is_frame = std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);
+  const std::lock_guard lock(mutex);
+  if (status) {
+    ++(is_frame ? progress.frames : progress.sensor_samples);
+  } else if (status.error().code == ErrorCode::input) {
+    ++progress.rejected;
+    return {};
   }
-  return {};
+  return status;
 }
 
 Status StreamRecorder::State::write(const Sample& sample) {

@@ -65,8 +65,10 @@ struct RunHooks {
   std::function<bool()> should_stop;                 ///< asked before each sample; a recorded run ends with a frame
   /// The localization at the newest sample: after each sample of the IMU and each frame.
   std::function<void(const LocalizationEstimate&)> estimate;
-  std::function<void(const FrameRecord&)> frame;       ///< each frame of the odometry pair, missing ones included
-  std::function<void(const MappedStop&)> map;          ///< each map that was applied
+  std::function<void(const FrameRecord&)> frame;  ///< each frame of the odometry pair, missing ones included
+  /// Each map that was applied, when its files are written; `has_files`: false where the disk was full or too slow for
+  /// them. Called by any thread.
+  std::function<void(const MappedStop&, bool has_files)> map;
   std::function<std::optional<RunCommand>()> command;  ///< asked between the samples of a live stream, until empty
   std::function<void(const PanoramaEvent&)> panorama;  ///< called by another thread
   /// Called once, by another thread, where a stage takes longer than RunRequest::watchdog_s (of the back end and of the

@@ -70,10 +70,8 @@ DELETE FROM terrain WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
 DELETE FROM maps WHERE EXISTS (SELECT 1 FROM counts) AND stamp_ns NOT IN (
   SELECT stamp_ns FROM maps ORDER BY stamp_ns LIMIT (SELECT maps FROM counts));
 )";
-constexpr const char* kReplaceCounts =
-    "INSERT OR REPLACE INTO counts SELECT 1, (SELECT coalesce(max(seq), 0) FROM frames), (SELECT count(*) FROM "
-    "terrain), "
-    "(SELECT count(*) FROM maps)";
+constexpr const char* kSelectCounts =
+    "SELECT (SELECT coalesce(max(seq), 0) FROM frames), (SELECT count(*) FROM terrain), (SELECT count(*) FROM maps)";
 constexpr const char* kSelectProgress =
     "SELECT (SELECT coalesce(max(seq), 0) FROM frames), (SELECT coalesce(max(samples_taken), -1) FROM memory)";
 
@@ -138,7 +136,8 @@ Status RunStore::State::prepare() {
       {&replace_content, "INSERT OR REPLACE INTO identity VALUES ('content',?)"},
       {&replace_stream, "INSERT OR REPLACE INTO identity VALUES ('stream',?)"},
       {&replace_elapsed, "INSERT OR REPLACE INTO elapsed VALUES (1,?,?)"},
-      {&replace_counts, kReplaceCounts},
+      {&replace_counts, "INSERT OR REPLACE INTO counts VALUES (1,?,?,?)"},
+      {&select_counts, kSelectCounts},
       {&select_progress, kSelectProgress},
   };
   for (const auto& [statement, sql] : statements) {
@@ -167,6 +166,15 @@ Result<RunStore::State::Progress> RunStore::State::stored_progress() {
   const Progress stored{select_progress->integer(0), select_progress->integer(1)};
   select_progress->reset();
   return stored;
+}
+
+Result<RunStore::RowCounts> RunStore::State::row_counts() {
+  select_counts->reset();
+  const auto row = select_counts->step();
+  if (!row) return failure(row);
+  const RowCounts counts{select_counts->integer(0), select_counts->integer(1), select_counts->integer(2)};
+  select_counts->reset();
+  return counts;
 }
 
 Status RunStore::State::expect_unchanged() {
@@ -220,7 +228,9 @@ Status RunStore::State::write_checkpoint(const Checkpoint& checkpoint) {
   append_checksum(memory);
   if (Status s = replace_checkpoint->bind(1, source.samples_taken).bind(2, memory).run(); !s) return s;
   if (Status s = replace_elapsed->bind(1, 1e3 * elapsed.wall_s).bind(2, 1e3 * elapsed.cpu_s).run(); !s) return s;
-  if (Status s = replace_counts->run(); !s) return s;
+  const auto rows = checkpoint.rows ? Result<RowCounts>(*checkpoint.rows) : row_counts();
+  if (!rows) return failure(rows);
+  if (Status s = replace_counts->bind(1, rows->frames).bind(2, rows->terrain).bind(3, rows->maps).run(); !s) return s;
   if (Status s = replace_content->bind(1, fmt::format("{:016x}", source.content_hash)).run(); !s) return s;
   if (source.last_stamps.empty()) return {};
   std::string text;
@@ -366,6 +376,10 @@ Status RunStore::commit(const std::vector<Step>& steps, const std::optional<Chec
     if (Status s = state_->tiles->write(maps); !s) return s;
     return checkpoint ? state_->write_checkpoint(*checkpoint) : Status();
   });
+}
+
+Result<RunStore::RowCounts> RunStore::row_counts() {
+  return state_->row_counts();
 }
 
 Status RunStore::commit_smoothed(const std::vector<std::optional<UncertainPose>>& poses) {

@@ -123,11 +123,16 @@ class RunStore {
     /// Of a live stream: the latest stamp of each pair and each sensor (stream_name()).
     std::map<std::string, Stamp> last_stamps{};
   };
+  /// Records in the store.
+  struct RowCounts {
+    std::int64_t frames = 0, terrain = 0, maps = 0;
+  };
   /// State from which a run is resumed. Only the latest is kept.
   struct Checkpoint {
     Bytes pipeline_state;  ///< Pipeline::save() after the last step
     SourcePosition source;
     ElapsedTime elapsed{};
+    std::optional<RowCounts> rows{};  ///< up to that step, where later ones are committed with it or before; else empty
   };
   /// Writes the steps, and a checkpoint with the changes of the map up to it, in one transaction, completely or not at
   /// all. Codes: `output` if the file cannot be written, was removed, or was changed by another process.
@@ -146,6 +151,8 @@ class RunStore {
   Result<std::vector<FrameRecord>> frames();
   Result<std::vector<TerrainRecord>> terrain();
   Result<std::vector<MapRecord>> maps();
+
+  Result<RowCounts> row_counts();
 
   /// The latest checkpoint; none before the first commit.
   Result<std::optional<Checkpoint>> checkpoint();

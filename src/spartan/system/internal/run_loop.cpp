@@ -25,6 +25,7 @@ constexpr std::chrono::milliseconds kStopPoll{50};
 
 Status RunLoop::begin() {
   pipeline_.store_maps_in(recorder_->tiles());
+  recorder_->report_maps_to(hooks_.map);
   total_frames_ = recording_ ? static_cast<int>(recording_->listed_stamps(pipeline_.odometry_pair()).size()) : 0;
   if (request_.max_frames > 0)
     total_frames_ = recording_ ? std::min(total_frames_, request_.max_frames) : request_.max_frames;
@@ -114,7 +115,8 @@ Status RunLoop::process_samples() {
     const double limit_s = request_.watchdog_s;
     watchdog.emplace(std::vector<WatchedStage>{{&front_end_, limit_s},
                                                {&pipeline_.back_end_stage(), kBackEndPatience * limit_s},
-                                               {&recorder_->running(), kBackEndPatience * limit_s}},
+                                               {&recorder_->running(), kBackEndPatience * limit_s},
+                                               {&recorder_->waiting_for(), kBackEndPatience * limit_s}},
                      hooks_.hung);
   }
   const Status processed = process_until_end();
@@ -176,7 +178,6 @@ Status RunLoop::finish() {
     result.stop = std::move(*stop);
     result.terrain = pipeline_.finish_terrain();
     result.x_is_east = heading_east();
-    if (hooks_.map && result.stop) hooks_.map(*result.stop);
     const bool last = !result.stop && !result.terrain;
     result.step.times = take_stage_times();
     result.step.localization_inputs = pipeline_.take_localization_inputs();
@@ -299,7 +300,6 @@ Status RunLoop::record(RunResult result) {
   result.x_is_east = heading_east();
   const FrameRecord& frame = *result.step.frame;
   if (hooks_.frame) hooks_.frame(frame);
-  if (hooks_.map && result.stop) hooks_.map(*result.stop);
   report_estimate();
   if (resumed_ && !resumed_from_frame_) resumed_from_frame_ = frame.frame_id;
   ++frames_;
@@ -391,8 +391,8 @@ void RunLoop::add_checkpoint(RunResult& result) {
   result.checkpoint = RunStore::Checkpoint{pipeline_.save(), {samples_taken_, content, last_stamps_}, elapsed()};
   // The frames that the back end works on are read again from the recording.
   if (stream_recorder_) {
-    result.before_checkpoint = [recorder = stream_recorder_, count = stream_recorder_->added()] {
-      recorder->wait_until_synced(count);
+    result.can_commit_checkpoint = [recorder = stream_recorder_, count = stream_recorder_->added()] {
+      return recorder->is_synced(count);
     };
   }
   result.maps = pipeline_.take_map_changes();

@@ -33,6 +33,9 @@ Error as_output_error(Error error) {
   return error;
 }
 
+// How often a checkpoint that waits is tried.
+constexpr std::chrono::milliseconds kAskAgain{10};
+
 std::chrono::nanoseconds seconds(double s) {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(s * 1e9));
 }
@@ -46,8 +49,12 @@ Result<std::unique_ptr<RunRecorder>> RunRecorder::create(RunStore store, RunFold
   auto owned = std::make_unique<Database>(std::move(*db));
   auto tiles = TileStore::open_existing(*owned);
   if (!tiles) return failure(tiles);
-  return std::unique_ptr<RunRecorder>(
+  const auto rows = store.row_counts();
+  if (!rows) return failure(rows);
+  auto recorder = std::unique_ptr<RunRecorder>(
       new RunRecorder(std::move(store), std::move(owned), std::move(*tiles), std::move(folder), options, pace));
+  recorder->rows_ = *rows;
+  return recorder;
 }
 
 RunRecorder::RunRecorder(RunStore store, std::unique_ptr<Database> db, TileStore tiles, RunFolder folder,
@@ -76,9 +83,7 @@ Status RunRecorder::add(RunResult result) {
     changed_.wait(lock, [this] { return !status_ || (waiting_.size() < kMostResults && files_waiting_ < kMostFiles); });
   } else if (files_waiting_ + files_of(result) > kMostFiles) {
     statistics_.files_discarded += static_cast<std::int64_t>(files_of(result));
-    result.terrain.reset();
-    if (result.stop) result.step.map = record_of(*result.stop);
-    result.stop.reset();
+    discard_files(result);
   }
   if (!status_) return status_;
   files_waiting_ += files_of(result);
@@ -93,8 +98,9 @@ Status RunRecorder::flush() {
   flushing_ = true;
   changed_.notify_all();
   if (thread_.joinable()) {
-    changed_.wait(
-        lock, [this] { return !status_ || (waiting_.empty() && !busy_ && batch_.empty() && transactions_.empty()); });
+    changed_.wait(lock, [this] {
+      return !status_ || (waiting_.empty() && !busy_ && batch_.empty() && transactions_.empty() && !held_);
+    });
   }
   flushing_ = false;
   return status_;
@@ -120,13 +126,13 @@ RecorderStatistics RunRecorder::statistics() const {
   return statistics_;
 }
 
-std::chrono::steady_clock::time_point RunRecorder::commit_time() const {
+RunRecorder::Clock::time_point RunRecorder::commit_time() const {
   return oldest_ + seconds(options_.every_s);
 }
 
-// When there is something to do without another result.
-std::chrono::steady_clock::time_point RunRecorder::wake_time() const {
-  const auto never = std::chrono::steady_clock::time_point::max();
+// When there is something to commit without another result.
+RunRecorder::Clock::time_point RunRecorder::due_time() const {
+  const auto never = Clock::time_point::max();
   return std::min(batch_.empty() ? never : commit_time(), transactions_.empty() ? never : retry_);
 }
 
@@ -136,10 +142,11 @@ void RunRecorder::run() {
     const auto has_work = [this] {
       return ended_ || !waiting_.empty() || (flushing_ && !(batch_.empty() && transactions_.empty()));
     };
-    if (batch_.empty() && transactions_.empty()) {
+    if (batch_.empty() && transactions_.empty() && !held_) {
       changed_.wait(lock, has_work);
     } else {
-      changed_.wait_until(lock, wake_time(), has_work);
+      const auto due = due_time();
+      changed_.wait_until(lock, held_ ? std::min(due, Clock::now() + kAskAgain) : due, has_work);
     }
     if (ended_ || !status_) return;
     std::optional<RunResult> next;
@@ -149,10 +156,13 @@ void RunRecorder::run() {
       files_waiting_ -= files_of(*next);
     }
     busy_ = true;
+    const bool flushing = flushing_;
     lock.unlock();
     Status status;
     try {
-      status = next ? process(std::move(*next)) : commit({}, {});  // also where a retry is due
+      status = commit_held(false);
+      if (status && next) status = process(std::move(*next));
+      if (status && !next && (flushing || Clock::now() >= due_time())) status = commit({}, {});
     } catch (const std::bad_alloc& exception) {
       status = tl::unexpected(out_of_memory(exception));
     }
@@ -163,24 +173,62 @@ void RunRecorder::run() {
   }
 }
 
+bool RunRecorder::is_ended() const {
+  const Lock lock(mutex_);
+  return ended_;
+}
+
+void RunRecorder::discard_files(RunResult& result) const {
+  result.terrain.reset();
+  if (!result.stop) return;
+  result.step.map = record_of(*result.stop);
+  if (map_report_) map_report_(*result.stop, false);
+  result.stop.reset();
+}
+
 Status RunRecorder::process(RunResult result) {
   if (Status written = write_files(result); !written) {
     if (!may_wait_for_disk(written)) return written;
     note_disk(written);
-    if (result.stop && !result.step.map) result.step.map = record_of(*result.stop);
-    const Lock lock(mutex_);
-    statistics_.files_discarded += static_cast<std::int64_t>(files_of(result));
+    {
+      const Lock lock(mutex_);
+      statistics_.files_discarded += static_cast<std::int64_t>(files_of(result));
+    }
+    discard_files(result);
   }
-  if (batch_.empty()) oldest_ = std::chrono::steady_clock::now();
+  if (result.stop && map_report_) map_report_(*result.stop, true);
+  if (batch_.empty()) oldest_ = Clock::now();
+  rows_.frames += result.step.frame ? 1 : 0;
+  rows_.terrain += result.step.terrain ? 1 : 0;
+  rows_.maps += result.step.map ? 1 : 0;
   batch_.push_back(std::move(result.step));
-  const bool due = result.checkpoint || result.commit_now || std::chrono::steady_clock::now() >= commit_time();
-  if (result.checkpoint && result.before_checkpoint) {
-    if (Status committed = commit({}, {}); !committed) return committed;  // frames do not wait for the recording
-    StageClock clock(CLOCK_THREAD_CPUTIME_ID);
-    clock.show_in(running_);
-    clock.measure("recording", [&] { result.before_checkpoint(); });
+  if (result.checkpoint) {
+    if (Status committed = commit_held(true); !committed || held_) return committed;
+    if (!result.can_commit_checkpoint) return commit(std::move(result.checkpoint), std::move(result.maps));
+    hold(result);
+    if (Status committed = commit_held(false); !committed || !held_) return committed;
+    return commit({}, {});  // frames do not wait for the recording
   }
-  return due ? commit(std::move(result.checkpoint), std::move(result.maps)) : Status();
+  const bool due = result.commit_now || Clock::now() >= commit_time();
+  return due ? commit({}, {}) : Status();
+}
+
+void RunRecorder::hold(RunResult& result) {
+  held_ = {std::move(*result.checkpoint), std::move(result.maps), std::move(result.can_commit_checkpoint)};
+  held_->checkpoint.rows = rows_;
+  waiting_for_.begin("recording");
+}
+
+// With what comes before it. `wait`: until it can be committed.
+Status RunRecorder::commit_held(bool wait) {
+  if (!held_) return {};
+  while (!held_->can_commit()) {
+    if (!wait || is_ended()) return {};
+    std::this_thread::sleep_for(kAskAgain);
+  }
+  waiting_for_.end(nullptr);
+  HeldCheckpoint held = std::move(*std::exchange(held_, std::nullopt));
+  return commit(std::move(held.checkpoint), std::move(held.maps));
 }
 
 Status RunRecorder::write_files(RunResult& result) {
@@ -228,12 +276,12 @@ Status RunRecorder::commit(std::optional<RunStore::Checkpoint> checkpoint, MapCh
     const Lock lock(mutex_);
     flushing = flushing_;
   }
-  const bool waits = transactions_.size() > 1 && std::chrono::steady_clock::now() < retry_;
+  const bool waits = transactions_.size() > 1 && Clock::now() < retry_;
   if (waits && !flushing) return {};
   Status committed = commit_transactions();
   if (committed || flushing || !may_wait_for_disk(committed)) return committed;
   note_disk(committed);
-  retry_ = std::chrono::steady_clock::now() + kRetry;
+  retry_ = Clock::now() + kRetry;
   return {};
 }
 

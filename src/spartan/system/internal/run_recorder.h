@@ -31,8 +31,9 @@ struct RunResult {
   bool commit_now = false;             ///< do not wait for CommitOptions::every_s
   /// The state after this result, if the run can be resumed from here.
   std::optional<RunStore::Checkpoint> checkpoint;
-  MapChanges maps;                            ///< with a checkpoint
-  std::function<void()> before_checkpoint{};  ///< waits for what the checkpoint refers to; may be empty
+  MapChanges maps;  ///< with a checkpoint
+  /// Whether what the checkpoint refers to is on disk; asked until it is. Empty: it is.
+  std::function<bool()> can_commit_checkpoint{};
 };
 
 /// Results that wait for the disk, and what became of them.
@@ -41,7 +42,8 @@ struct RecorderStatistics {
   std::int64_t files_discarded = 0;  ///< terrain views and local maps whose files were not written (Pace::live)
 };
 
-/// Results are committed in their order, many in one transaction (CommitOptions).
+/// Results are committed in their order, many in one transaction (CommitOptions). Those after a checkpoint that has to
+/// wait do not wait for it.
 ///
 /// Pace::recorded: add() waits where too many results wait for the disk, and an error of the disk ends the run.
 /// Pace::live: add() never waits; files of terrain views and maps are then not written. Where the disk cannot be
@@ -49,6 +51,8 @@ struct RecorderStatistics {
 /// only where kMostUncommitted wait is it an error.
 class RunRecorder {
  public:
+  /// What becomes of each map: whether its files are written, when they are. Called by any thread.
+  using MapReport = std::function<void(const MappedStop&, bool has_files)>;
   /// Opens a second connection to the store, for reading map tiles. Codes: `output`, `store_damaged`, `resources`.
   static Result<std::unique_ptr<RunRecorder>> create(RunStore store, RunFolder folder, const RunOptions& options,
                                                      Pace pace);
@@ -57,6 +61,8 @@ class RunRecorder {
   RunRecorder(const RunRecorder&) = delete;
   RunRecorder& operator=(const RunRecorder&) = delete;
 
+  /// Before the first add().
+  void report_maps_to(MapReport report) { map_report_ = std::move(report); }
   /// An error is that of an earlier result; no result after it is written. Codes: `output`, `resources`.
   Status add(RunResult result);
   /// Returns when all results are committed. Codes as add(): an error of the disk now.
@@ -75,6 +81,8 @@ class RunRecorder {
   RecorderStatistics statistics() const;
   /// What its thread does now.
   const RunningStage& running() const { return running_; }
+  /// What a checkpoint waits for.
+  const RunningStage& waiting_for() const { return waiting_for_; }
 
   static constexpr std::size_t kMostFiles = 8;             ///< terrain views and maps that may wait
   static constexpr std::size_t kMostResults = 512;         ///< results that may wait (Pace::recorded)
@@ -83,17 +91,34 @@ class RunRecorder {
 
  private:
   using Lock = std::unique_lock<std::mutex>;
+  using Clock = std::chrono::steady_clock;
+  // What is to be committed together.
+  struct Transaction {
+    std::vector<RunStore::Step> steps;
+    std::optional<RunStore::Checkpoint> checkpoint;
+    MapChanges maps;
+  };
+  // A checkpoint whose steps are committed before it.
+  struct HeldCheckpoint {
+    RunStore::Checkpoint checkpoint;
+    MapChanges maps;
+    std::function<bool()> can_commit;
+  };
   RunRecorder(RunStore store, std::unique_ptr<Database> db, TileStore tiles, RunFolder folder,
               const RunOptions& options, Pace pace);
   void run();
   Status process(RunResult result);
   Status write_files(RunResult& result);
+  void discard_files(RunResult& result) const;
+  void hold(RunResult& result);
+  Status commit_held(bool wait);
   Status commit(std::optional<RunStore::Checkpoint> checkpoint, MapChanges maps);
   Status commit_transactions();
   bool may_wait_for_disk(const Status& status) const;
   void note_disk(const Status& status);
-  std::chrono::steady_clock::time_point wake_time() const;
-  std::chrono::steady_clock::time_point commit_time() const;
+  Clock::time_point due_time() const;
+  Clock::time_point commit_time() const;
+  bool is_ended() const;
   static std::size_t files_of(const RunResult& result) { return (result.terrain ? 1U : 0U) + (result.stop ? 1U : 0U); }
 
   RunStore store_;
@@ -103,22 +128,18 @@ class RunRecorder {
   TerrainOptions terrain_options_;
   CommitOptions options_;
   Pace pace_;
-
-  // What is to be committed together.
-  struct Transaction {
-    std::vector<RunStore::Step> steps;
-    std::optional<RunStore::Checkpoint> checkpoint;
-    MapChanges maps;
-  };
+  MapReport map_report_;
 
   // Of the thread, and read by flush() while it is not busy.
   std::deque<Transaction> transactions_;  // more than one where the disk cannot be written to
   std::size_t uncommitted_ = 0;           // steps in them
-  std::chrono::steady_clock::time_point retry_;
+  Clock::time_point retry_;
   std::vector<RunStore::Step> batch_;
-  std::chrono::steady_clock::time_point oldest_;  // of the batch
+  Clock::time_point oldest_;  // of the batch
+  std::optional<HeldCheckpoint> held_;
+  RunStore::RowCounts rows_;  // with all transactions and the batch
 
-  RunningStage running_;
+  RunningStage running_, waiting_for_;
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<RunResult> waiting_;

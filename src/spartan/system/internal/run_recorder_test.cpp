@@ -8,9 +8,11 @@
 #include <csignal>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "spartan/testing/temporary_folder.h"
 
@@ -39,6 +41,19 @@ RunResult terrain_result(int i) {
   view.left = Image<std::uint8_t>(8, 6, 100);
   view.disparity = Image<float>(8, 6, 2.0F);
   view.sigma = Image<float>(8, 6, 0.2F);
+  return result;
+}
+
+RunResult map_result(int i) {
+  RunResult result = frame_result(i);
+  MappedStop& stop = result.stop.emplace();
+  stop.stamp = result.step.frame->stamp;
+  LocalMap& map = stop.merged.local;
+  for (Image<float>* const layer :
+       {&map.elevation_m, &map.elevation_min_m, &map.elevation_max_m, &map.variance_m2, &map.count, &map.ground_m,
+        &map.slope_rad, &map.roughness_m, &map.step_m, &map.occupancy_logodds, &map.cost})
+    *layer = Image<float>(4, 4, 0.0F);
+  map.kind = Image<GroundClass>(4, 4, GroundClass::ground);
   return result;
 }
 
@@ -215,26 +230,68 @@ TEST_F(RunRecorderTest, ReportsAnErrorOfTheDisk) {
 // A recording that hangs.
 TEST_F(RunRecorderTest, FramesDoNotWaitForTheRecording) {
   CommitOptions commit;
-  commit.every_s = 1000;
+  commit.every_s = 0.01;
   const auto recorder = open(commit, Pace::live);
   std::atomic<bool> hangs = true;
   RunResult result = frame_result(0);
-  result.checkpoint = RunStore::Checkpoint{};
-  result.before_checkpoint = [&] {
-    while (hangs) std::this_thread::sleep_for(1ms);
-  };
+  result.checkpoint = RunStore::Checkpoint{{1, 2, 3}, {5, 6}};
+  result.maps.number = 3;
+  result.can_commit_checkpoint = [&] { return !hangs; };
   ASSERT_TRUE(recorder->add(std::move(result)));
-  const auto until = std::chrono::steady_clock::now() + 20s;
-  std::string stage;
-  while (stage != "recording" && std::chrono::steady_clock::now() < until) {
-    std::this_thread::sleep_for(1ms);
-    const char* const running = recorder->running().stage();
-    stage = running == nullptr ? "" : running;
+  ASSERT_TRUE(recorder->add(terrain_result(1)));
+  ASSERT_TRUE(recorder->add(frame_result(2)));
+  for (int i = 0; i < 2000 && committed_frames() < 3; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(committed_frames(), 3u);
+  EXPECT_STREQ(recorder->waiting_for().stage(), "recording") << "for the watchdog";
+  EXPECT_TRUE(recorder->checkpoint_waits());
+  EXPECT_EQ(recorder->maps_stored(), 0U);
+  hangs = false;
+  for (int i = 0; i < 2000 && recorder->checkpoint_waits(); ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_EQ(recorder->waiting_for().stage(), nullptr);
+  EXPECT_EQ(recorder->maps_stored(), 3U);
+  EXPECT_TRUE(recorder->flush());
+  EXPECT_EQ(committed_frames(), 3u);
+  const auto resumed = RunStore::resume(run_.store(), {"input", "options", "rig"});
+  ASSERT_TRUE(resumed);
+  EXPECT_EQ(committed_frames(), 1u) << "those after the checkpoint will come again";
+  EXPECT_EQ(RunStore::open_read_only(run_.store())->terrain()->size(), 0u);
+}
+
+TEST_F(RunRecorderTest, ALaterCheckpointWaitsForTheOneBefore) {
+  const auto recorder = open({}, Pace::live);
+  std::atomic<bool> hangs = true;
+  for (std::uint8_t i = 0; i < 2; ++i) {
+    RunResult result = frame_result(i);
+    result.checkpoint = RunStore::Checkpoint{{i}, {5, 6}};
+    result.maps.number = i + 1U;
+    result.can_commit_checkpoint = [&] { return !hangs; };
+    ASSERT_TRUE(recorder->add(std::move(result)));
   }
-  EXPECT_EQ(stage, "recording") << "for the watchdog";
-  EXPECT_EQ(committed_frames(), 1u);
+  EXPECT_EQ(recorder->maps_stored(), 0U);
   hangs = false;
   EXPECT_TRUE(recorder->flush());
+  EXPECT_EQ(recorder->maps_stored(), 2U);
+  EXPECT_EQ((*recorder->store().checkpoint())->pipeline_state, (Bytes{1}));
+}
+
+// Live, files are discarded while too many wait; nobody may wait for them.
+TEST_F(RunRecorderTest, ReportsWhetherTheFilesOfAMapAreWritten) {
+  const auto recorder = open({}, Pace::live);
+  std::vector<std::string> reports;
+  std::mutex mutex;
+  recorder->report_maps_to([&](const MappedStop& stop, bool has_files) {
+    const std::lock_guard lock(mutex);
+    const bool there = std::filesystem::exists(run_.local_map(stop.stamp) + ".tif");
+    reports.push_back(has_files == there ? "as reported" : "not as reported");
+    if (!has_files) reports.push_back("discarded");
+  });
+  std::filesystem::remove_all(run_.maps());
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(recorder->add(map_result(i)));
+    ASSERT_TRUE(recorder->flush());
+    ASSERT_TRUE(make_folder(run_.maps()));
+  }
+  EXPECT_EQ(reports, (std::vector<std::string>{"as reported", "discarded", "as reported"}));
 }
 
 }  // namespace

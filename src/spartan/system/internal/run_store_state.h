@@ -18,7 +18,7 @@ struct RunStore::State {
   Database db;
   std::optional<SqlStatement> insert_frame, insert_time, insert_localization, insert_slam, insert_health,
       insert_innovation, insert_latency, insert_inputs, insert_smoothed, insert_terrain, insert_map, select_progress,
-      replace_checkpoint, replace_content, replace_elapsed, replace_counts, replace_stream;
+      replace_checkpoint, replace_content, replace_elapsed, replace_counts, replace_stream, select_counts;
   /// How far the stored run has come.
   struct Progress {
     std::int64_t frames = 0, samples_taken = 0;  ///< committed frames; samples at the latest checkpoint, −1: none
@@ -30,6 +30,7 @@ struct RunStore::State {
   /// Removes the records after the latest checkpoint.
   Status return_to_checkpoint();
   Result<Progress> stored_progress();
+  Result<RowCounts> row_counts();
   /// Code `output` if the database is no longer the one that this process wrote last.
   Status expect_unchanged();
   /// Calls write() in a transaction.
