@@ -1,11 +1,15 @@
 #include "spartan/system/run.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "program/calibration_advice.h"
 #include "program/commands.h"
@@ -20,6 +24,7 @@
 #include "program/run_arguments.h"
 #include "program/run_summary_text.h"
 #include "program/service_notifier.h"
+#include "program/standard_error.h"
 #include "program/trajectory_report.h"
 #include "spartan/core/files.h"
 #include "spartan/report/report.h"
@@ -57,18 +62,39 @@ Result<std::unique_ptr<Publisher>> open_publisher(const RunArguments& arguments,
   return publisher;
 }
 
-// What connects a live run to the rover's computer. Borrowed; the first two may be null.
+// What connects a live run to the rover's computer. Borrowed; the pointers may be null.
 struct RoverLinks {
   Publisher* publisher;
   ControlLines* control;
+  StandardErrorBuffer* standard_error;
   ServiceNotifier& service;
 };
 
+// Ends the program, also where the stage hangs in the log, whose lock it then holds: on a lost disk.
+[[noreturn]] void end_hung_run(const Log& log, const StandardErrorBuffer* standard_error, const std::string& stage,
+                               double seconds) {
+  const std::string text = fmt::format("stage '{}' has not ended for {:.1f} s; the run ends", stage, seconds);
+  const auto said = std::make_shared<std::promise<void>>();
+  std::thread([said, log, text] {
+    log.error(text);
+    said->set_value();
+  }).detach();
+  if (said->get_future().wait_for(std::chrono::seconds(1)) != std::future_status::ready) {
+    const std::string line = "error: " + text + "\n";
+    static_cast<void>(::write(STDERR_FILENO, line.data(), line.size()));
+  }
+  if (standard_error != nullptr) standard_error->flush();
+  std::_Exit(kInternalFault);
+}
+
 RunHooks live_hooks(const Context& context, Progress& progress, const RoverLinks& links) {
   RunHooks hooks = run_hooks(context, progress);
-  hooks.hung = [log = context.log](const std::string& stage, double seconds) {
-    log.error(fmt::format("stage '{}' has not ended for {:.1f} s; the run ends", stage, seconds));
-    std::_Exit(kInternalFault);
+  hooks.hung = [log = context.log, error = links.standard_error](const std::string& stage, double seconds) {
+    end_hung_run(log, error, stage, seconds);
+  };
+  hooks.should_stop = [asked = hooks.should_stop, service = &links.service] {
+    service->alive();
+    return asked();
   };
   if (links.control != nullptr) hooks.command = [control = links.control] { return control->next(); };
   hooks.frame = [publisher = links.publisher, service = &links.service](const FrameRecord& frame) {
@@ -78,7 +104,7 @@ RunHooks live_hooks(const Context& context, Progress& progress, const RoverLinks
   Publisher* const publisher = links.publisher;
   if (publisher == nullptr) return hooks;
   hooks.estimate = [publisher](const LocalizationEstimate& estimate) { publisher->publish(pose_message(estimate)); };
-  hooks.map = [publisher](const MappedStop& stop) { publisher->publish(map_message(stop)); };
+  hooks.map = [publisher](const MappedStop& stop, bool has_files) { publisher->publish(map_message(stop, has_files)); };
   hooks.panorama = [publisher](const PanoramaEvent& event) { publisher->publish(panorama_message(event)); };
   return hooks;
 }
@@ -188,9 +214,12 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
   auto control = arguments.control.empty() ? Result<std::unique_ptr<ControlLines>>()
                                            : ControlLines::open(arguments.control, context.log);
   if (!control) return failure(control);
+  const bool live = is_live_input(arguments.input);
+  const auto standard_error = live ? std::make_unique<StandardErrorBuffer>() : nullptr;
   ServiceNotifier service;
-  auto outcome = run_input(context, arguments, *request,
-                           live_hooks(context, progress, {publisher->get(), control->get(), service}));
+  auto outcome =
+      run_input(context, arguments, *request,
+                live_hooks(context, progress, {publisher->get(), control->get(), standard_error.get(), service}));
   service.stopping();
   if (!outcome) return failure(outcome);
   std::string text = run_summary_text(outcome->summary_json, arguments.output);
@@ -199,7 +228,6 @@ Result<ExitCode> run_command(const Context& context, const RunArguments& argumen
     if (!table) return failure(table);
     text += "\n" + *table;
   }
-  const bool live = is_live_input(arguments.input);
   if (live) accept_interrupt();
   if (!outcome->interrupted && !live) {
     if (Status s = write_report(*request, arguments.truth, context); !s)

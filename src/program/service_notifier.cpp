@@ -9,6 +9,11 @@
 #include <cstdlib>
 
 namespace spartan::program {
+namespace {
+
+constexpr std::chrono::milliseconds kSendEvery{500};
+
+}  // namespace
 
 ServiceNotifier::ServiceNotifier() {
   const char* const address = std::getenv("NOTIFY_SOCKET");
@@ -34,15 +39,19 @@ void ServiceNotifier::send(const std::string& text) const {
 }
 
 void ServiceNotifier::frame(const std::string& status) {
+  if (status_.empty()) send("READY=1\nSTATUS=" + status);
+  status_ = status;
+}
+
+void ServiceNotifier::alive() {
   const auto now = std::chrono::steady_clock::now();
-  if (ready_ && now - sent_ < std::chrono::milliseconds(500)) return;
-  send(std::string(ready_ ? "" : "READY=1\n") + "WATCHDOG=1\nSTATUS=" + status);
-  ready_ = true;
+  if (now - sent_ < kSendEvery) return;
+  send(status_.empty() ? "WATCHDOG=1" : "WATCHDOG=1\nSTATUS=" + status_);
   sent_ = now;
 }
 
 void ServiceNotifier::stopping() {
-  if (ready_) send("STOPPING=1\n");
+  if (!status_.empty()) send("STOPPING=1\n");
 }
 
 }  // namespace spartan::program

@@ -14,8 +14,11 @@ class ServiceNotifier {
   ServiceNotifier(const ServiceNotifier&) = delete;
   ServiceNotifier& operator=(const ServiceNotifier&) = delete;
 
-  /// After each frame: ready with the first one; alive, and `status`, at most twice a second.
+  /// After each frame: ready with the first one.
   void frame(const std::string& status);
+  /// From the loop of the run, also where no frame comes, as during a panorama. Tells twice a second that the run is
+  /// alive, and the status of the last frame.
+  void alive();
   void stopping();
 
  private:
@@ -23,7 +26,7 @@ class ServiceNotifier {
 
   std::string address_;
   int socket_ = -1;
-  bool ready_ = false;
+  std::string status_;  // of the last frame
   std::chrono::steady_clock::time_point sent_;
 };
 

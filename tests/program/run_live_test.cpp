@@ -1,4 +1,6 @@
 // `spartan run` over a live stream: pace, messages, clean end, watchdog.
+#include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -234,9 +236,28 @@ TEST_F(RunLive, TellsAServiceManagerThatItIsReady) {
   }
   ::close(server);
   ASSERT_GE(messages.size(), 3U);
-  EXPECT_THAT(messages.front(), HasSubstr("READY=1\nWATCHDOG=1\nSTATUS=frame 0, odometry"));
-  EXPECT_THAT(messages[1], ::testing::StartsWith("WATCHDOG=1\n"));
+  EXPECT_EQ(messages.front(), "WATCHDOG=1") << "also before the first frame";
+  EXPECT_THAT(messages, ::testing::Contains(::testing::StartsWith("READY=1\nSTATUS=frame 0, odometry")).Times(1));
+  EXPECT_THAT(messages, ::testing::Contains(::testing::StartsWith("WATCHDOG=1\nSTATUS=frame ")));
   EXPECT_EQ(messages.back(), "STOPPING=1\n");
+}
+
+// As over a network that was cut off.
+TEST_F(RunLive, GoesOnWhereNobodyReadsItsStandardError) {
+  std::array<int, 2> ends{};
+  ASSERT_EQ(::pipe2(ends.data(), O_CLOEXEC), 0);
+  const std::string full(1U << 20U, 'x');
+  ASSERT_EQ(::fcntl(ends[1], F_SETFL, O_NONBLOCK), 0);
+  while (::write(ends[1], full.data(), full.size()) > 0) continue;
+  while (::write(ends[1], full.data(), 1) > 0) continue;
+  ASSERT_EQ(::fcntl(ends[1], F_SETFL, 0), 0);
+  const std::string to = fmt::format("/proc/{}/fd/{}", ::getpid(), ends[1]);
+  std::vector<std::string> all{to};
+  for (const std::string& word : words("live", {"--speed", "20"})) all.push_back(word);
+  const ProgramResult result = run_in_shell(R"(to=$1; shift; exec timeout -s KILL 60 "$0" "$@" 2>"$to")", all);
+  EXPECT_EQ(result.exit_code, 0);
+  ::close(ends[0]);
+  ::close(ends[1]);
 }
 
 TEST_F(RunLive, RejectsWhatCannotBePublishedTo) {
