@@ -40,9 +40,10 @@ nb::object array_of_pixels(const FrameImage& image) {
 
 }  // namespace
 
-FrameImage image_of_array(const AnyArray& array, const std::string& layout, std::optional<int> bits, const char* name) {
+FrameImage image_of_array(const AnyArray& array, const std::string& layout, std::optional<int> bits,
+                          const std::string& alignment, const char* name) {
   const bool wide = array.dtype() == nb::dtype<std::uint16_t>();
-  const PixelFormat format = pixel_format(layout, bits.value_or(wide ? 16 : 8));
+  const PixelFormat format = pixel_format(layout, bits.value_or(wide ? 16 : 8), alignment);
   if (format.layout == PixelLayout::rgb)
     return format.bits > 8 ? share<Rgb16>(array, format, name) : share<Rgb8>(array, format, name);
   return format.bits > 8 ? share<std::uint16_t>(array, format, name) : share<std::uint8_t>(array, format, name);

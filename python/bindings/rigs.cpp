@@ -36,15 +36,15 @@ void bind_parts(nb::module_& m) {
       .def(
           "__init__",
           [](Camera* self, const std::string& name, const Size& size, const CameraModelValue& model,
-             const std::string& layout, int bits) {
+             const std::string& layout, int bits, const std::string& alignment) {
             new (self) Camera{};
             self->name = name;
             self->size = {size.first, size.second};
             self->model = model.model;
-            self->pixel_format = pixel_format(layout, bits);
+            self->pixel_format = pixel_format(layout, bits, alignment);
           },
-          "name"_a, "size"_a, "model"_a, nb::kw_only(), "layout"_a = "gray", "bits"_a = 8,
-          "`size`: (width, height) in pixels; `layout` and `bits`: of its images, see StereoFrame.")
+          "name"_a, "size"_a, "model"_a, nb::kw_only(), "layout"_a = "gray", "bits"_a = 8, "alignment"_a = "low",
+          "`size`: (width, height) in pixels; `layout`, `bits` and `alignment`: of its images, see StereoFrame.")
       .def_ro("name", &Camera::name)
       .def_prop_ro(
           "size", [](const Camera& c) { return Size(c.size.width, c.size.height); }, "(width, height), px")
@@ -54,6 +54,8 @@ void bind_parts(nb::module_& m) {
           "`gray`, `rgb`, or a Bayer pattern such as `bayer_rggb`.")
       .def_prop_ro(
           "bits", [](const Camera& c) { return c.pixel_format.bits; }, "Significant bits of a sample.")
+      .def_prop_ro(
+          "alignment", [](const Camera& c) { return alignment_name(c.pixel_format); }, kAlignmentMeaning)
       .def_ro("mount", &Camera::mount, "`body` or the name of a pan-tilt unit.")
       .def_ro("mount_from_camera", &Camera::mount_from_camera)
       .def("__repr__", [](const Camera& c) {

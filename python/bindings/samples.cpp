@@ -11,6 +11,7 @@
 #include "bindings/arrays.h"
 #include "bindings/bindings.h"
 #include "bindings/frame_images.h"
+#include "bindings/pixel_format.h"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -26,20 +27,26 @@ struct FrameDetails {
 
 StereoFrame make_frame(const AnyArray& left, const AnyArray& right, std::int64_t left_stamp,
                        const std::optional<std::int64_t>& right_stamp, const std::string& pair,
-                       const std::string& layout, std::optional<int> bits, const FrameDetails& details) {
+                       const std::string& layout, std::optional<int> bits, const std::string& alignment,
+                       const FrameDetails& details) {
   StereoFrame frame;
   frame.frame_id = details.frame_id;
   frame.position_id = details.position_id;
   frame.pair = pair;
   frame.left_stamp = {left_stamp};
   frame.right_stamp = {right_stamp.value_or(left_stamp)};
-  frame.left = image_of_array(left, layout, bits, "left");
-  frame.right = image_of_array(right, layout, bits, "right");
+  frame.left = image_of_array(left, layout, bits, alignment, "left");
+  frame.right = image_of_array(right, layout, bits, alignment, "right");
   frame.pan_rad = details.pan_rad;
   frame.tilt_rad = details.tilt_rad;
   frame.exposure_us = details.exposure_us;
   frame.gain = details.gain;
   return frame;
+}
+
+// Of both images; one of them may be missing.
+const PixelFormat& format_of(const StereoFrame& frame) {
+  return (frame.left.empty() ? frame.right : frame.left).format();
 }
 
 void bind_frames(nb::module_& m) {
@@ -48,18 +55,18 @@ void bind_frames(nb::module_& m) {
           "__init__",
           [](StereoFrame* self, const AnyArray& left, const AnyArray& right, std::int64_t stamp,
              const std::optional<std::int64_t>& right_stamp, const std::string& pair, const std::string& layout,
-             std::optional<int> bits, std::int64_t frame_id, std::int64_t position_id, double pan, double tilt,
-             double exposure, double gain) {
-            new (self) StereoFrame(make_frame(left, right, stamp, right_stamp, pair, layout, bits,
+             std::optional<int> bits, const std::string& alignment, std::int64_t frame_id, std::int64_t position_id,
+             double pan, double tilt, double exposure, double gain) {
+            new (self) StereoFrame(make_frame(left, right, stamp, right_stamp, pair, layout, bits, alignment,
                                               {frame_id, position_id, pan, tilt, exposure, gain}));
           },
           "left"_a, "right"_a, "stamp_ns"_a, "right_stamp_ns"_a = nb::none(), nb::kw_only(), "pair"_a,
-          "layout"_a = "gray", "bits"_a = nb::none(), "frame_id"_a = 0, "position_id"_a = -1, "pan_rad"_a = 0.0,
-          "tilt_rad"_a = 0.0, "exposure_us"_a = 0.0, "gain"_a = 0.0,
+          "layout"_a = "gray", "bits"_a = nb::none(), "alignment"_a = "low", "frame_id"_a = 0, "position_id"_a = -1,
+          "pan_rad"_a = 0.0, "tilt_rad"_a = 0.0, "exposure_us"_a = 0.0, "gain"_a = 0.0,
           "Images of shape (height, width) for the layout `gray` and Bayer patterns (`bayer_rggb` …), (height, width, "
           "3) for "
-          "`rgb`; uint8 or uint16, of which `bits` are significant. They are not copied: they must not be changed "
-          "while the "
+          "`rgb`; uint8 or uint16, of which `bits` are significant: the least significant ones of a sample, or the "
+          "most significant ones with the `alignment` `high`. They are not copied: they must not be changed while the "
           "frame is in use. Stamps: nanoseconds, middle of the exposure. `position_id`: of the stop, shared by its "
           "frames.")
       .def_ro("frame_id", &StereoFrame::frame_id)
@@ -74,6 +81,11 @@ void bind_frames(nb::module_& m) {
       .def_prop_ro(
           "right", [](const StereoFrame& f) { return array_of_image(f.right); },
           nb::sig("def right(self) -> numpy.typing.NDArray[typing.Any]"), "The image, not copied; read-only.")
+      .def_prop_ro("layout", [](const StereoFrame& f) { return std::string(name_of(format_of(f).layout)); })
+      .def_prop_ro(
+          "bits", [](const StereoFrame& f) { return format_of(f).bits; }, "Significant bits of a sample.")
+      .def_prop_ro(
+          "alignment", [](const StereoFrame& f) { return alignment_name(format_of(f)); }, kAlignmentMeaning)
       .def_ro("pan_rad", &StereoFrame::pan_rad)
       .def_ro("tilt_rad", &StereoFrame::tilt_rad)
       .def_ro("exposure_us", &StereoFrame::exposure_us, "0: unknown.")

@@ -2,6 +2,7 @@
 
 import gc
 import pickle
+import time
 import weakref
 
 import numpy as np
@@ -26,6 +27,21 @@ def test_a_frame_has_the_memory_of_the_arrays(dtype, shape, layout, bits):
     assert np.array_equal(frame.left, left) and frame.left.dtype == dtype
     assert not frame.left.flags.writeable
     assert frame.stamp_ns == frame.right_stamp_ns == 5
+
+
+def test_the_format_of_a_frame_and_of_a_camera():
+    left, right = pair_of_images(np.uint16)
+    frame = spartan.StereoFrame(left, right, 0, pair="stereo", layout="bayer_grbg", bits=12, alignment="high")
+    camera = spartan.Camera("left", (320, 240), spartan.CameraModel("pinhole", focal_px=[250, 250], centre_px=[160, 120]), layout="bayer_grbg",
+                            bits=12, alignment="high")
+    for each in (frame, camera):
+        assert (each.layout, each.bits, each.alignment) == ("bayer_grbg", 12, "high")
+        with pytest.raises(AttributeError):
+            each.alignment = "low"
+    plain = spartan.StereoFrame(left, right, 0, pair="stereo")
+    assert (plain.layout, plain.bits, plain.alignment) == ("gray", 16, "low")
+    with pytest.raises(ValueError, match="alignment = 'middle': must be low or high"):
+        spartan.StereoFrame(left, right, 0, pair="stereo", alignment="middle")
 
 
 def test_a_part_of_an_image_is_not_copied():

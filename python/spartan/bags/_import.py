@@ -20,7 +20,7 @@ from spartan.bags._calibration import guessed_rig
 from spartan.bags._export_recording import DESCRIPTION_TOPIC
 from spartan.bags._images import pixels_of, stamp_of
 from spartan.bags._reader import MessageReader, first_message, opened
-from spartan.bags._rigs import with_known_masks, with_masks_of, with_readings_in_body, write_masks
+from spartan.bags._rigs import with_known_masks, with_layouts, with_masks_of, with_readings_in_body, write_masks
 from spartan.bags._topics import PairTopics, Topics, choose_topics
 
 _MOST_WAITING = 64  # images of one side without a partner
@@ -42,6 +42,7 @@ class _Importer:
         self.writer, self.rig, self.topics, self.tolerance_ns = writer, rig, topics, tolerance_ns
         self.waiting = {pair.name: _Waiting() for pair in topics.pairs}
         self.counts = {"frames": 0, "unpaired": 0, "samples": 0, "rejected": 0}
+        self.reasons: dict[str, Error] = {}  # the first one of each pair and each kind of sensor
         self.travelled: tuple[float, float, float, float, float] | None = None  # x, y, yaw, left, right
 
     def add(self, sample: Any) -> None:
@@ -51,6 +52,9 @@ class _Importer:
             if error.code != "input":  # a stamp that does not increase, an image of another size
                 raise
             self.counts["rejected"] += 1
+            source = f"pair {sample.pair}" if isinstance(sample, _core.StereoFrame) else type(sample).__name__
+            if self.reasons.setdefault(source, error) is error:
+                _LOG.warning("%s: rejected: %s", source, error)
         else:
             self.counts["frames" if isinstance(sample, _core.StereoFrame) else "samples"] += 1
 
@@ -126,8 +130,8 @@ class _Importer:
         waiting.frames += 1
         bits = camera.bits if left.dtype == np.uint16 and camera.bits > 8 else None
         return _core.StereoFrame(
-            left, right, stamp, right_stamp, pair=pair.name, layout=layout, bits=bits, frame_id=frame_id,
-            position_id=int(details.get("position_id", -1)), pan_rad=details.get("pan", 0.0),
+            left, right, stamp, right_stamp, pair=pair.name, layout=layout, bits=bits, alignment=camera.alignment,
+            frame_id=frame_id, position_id=int(details.get("position_id", -1)), pan_rad=details.get("pan", 0.0),
             tilt_rad=details.get("tilt", 0.0), exposure_us=details.get("exposure_us", 0.0), gain=details.get("gain", 0.0))
 
     def finish(self) -> dict[str, int]:
@@ -135,8 +139,18 @@ class _Importer:
             waiting = self.waiting[pair.name]
             self.match(pair, waiting, keep=0)
             self.counts["unpaired"] += len(waiting.left) + len(waiting.right)
+        if not self.counts["frames"]:
+            self.raise_no_frames()
         self.writer.finish()
         return self.counts
+
+    def raise_no_frames(self) -> None:
+        where = ", ".join(topic for pair in self.topics.pairs for topic in (pair.left, pair.right))
+        for reason in (self.reasons.get(f"pair {pair.name}") for pair in self.topics.pairs):
+            if reason is not None:
+                raise Error("input", f"no frame fits the calibration: {reason}", where, "name that of these cameras with --rig")
+        raise Error("input", f"no left and right image have stamps within {self.tolerance_ns / 1e9} s", where,
+                    "raise --pair-tolerance, or name other topics with --left and --right")
 
 
 @dataclass
@@ -171,23 +185,34 @@ def _description_in(bag: MessageReader) -> _Description | None:
     return _Description(with_readings_in_body(rig), masks, noise, name, gravity)
 
 
+def _layouts_in(bag: MessageReader, topics: Topics, rig: _core.Rig) -> dict[str, str]:
+    """The Bayer patterns of images whose cameras the rig has as gray: formats of other programs do not state layouts."""
+    found = {}
+    for pair in topics.pairs:
+        for side, topic in (("left", pair.left), ("right", pair.right)):
+            camera = rig.camera(getattr(rig.pair(pair.name), side))
+            _, layout = pixels_of(first_message(bag, topic), topic)
+            if camera.layout == "gray" and layout.startswith("bayer"):
+                found[camera.name] = layout
+    return found
+
+
 def _choose_rig(
     bag: MessageReader, topics: Topics, about: _Description | None, file: str | os.PathLike[str] | None
 ) -> tuple[_core.Rig, dict[str, bytes]]:
     """The rig of a file, that which Spartan wrote into the bag, or a guess, and the files of its self-masks. A single pair
     of topics takes its name."""
-    masks: dict[str, bytes] = {}
-    if file is not None:
-        rig, masks = with_masks_of(_core.read_rig(file), Path(file).parent)
-        if DESCRIPTION_TOPIC in bag.types():  # Spartan writes the readings of the IMU in base_link
-            rig = with_readings_in_body(rig)
-    elif about is not None:
+    if file is None and about is None:
+        return guessed_rig(bag, topics.pairs[0], topics.imu), {}
+    if file is None and about is not None:
         return about.rig, about.masks
-    else:
-        rig = guessed_rig(bag, topics.pairs[0], topics.imu)
+    assert file is not None
+    rig, masks = with_masks_of(_core.read_rig(file), Path(file).parent)
+    if DESCRIPTION_TOPIC in bag.types():  # Spartan writes the readings of the IMU in base_link
+        rig = with_readings_in_body(rig)
     if len(topics.pairs) == 1:
         topics.pairs[0].name = rig.pairs[0].name
-    return rig, masks
+    return with_layouts(rig, _layouts_in(bag, topics, rig)), masks
 
 
 def import_bag(
@@ -199,8 +224,10 @@ def import_bag(
 
     The calibration is, in this order: `rig`, that which Spartan wrote into the bag, `camera_info` with the mounts of
     `/tf_static`. `wheels` may be a topic of nav_msgs/Odometry. Returns counts: `frames`, `unpaired` images, `samples` of
-    sensors, and `rejected` ones whose stamps do not increase. Raises Error; with the code `input` where the bag is
-    damaged or a topic is missing or empty, with `output` where the recording cannot be written.
+    sensors, and `rejected` ones, whose stamps do not increase or whose images do not fit the calibration. Raises Error;
+    with the code `usage` for arguments that do not fit, `input` where the bag is damaged, a topic is missing or empty, or
+    no frame can be made, `configuration` where the calibration does not fit the topics, and `output` where the recording
+    cannot be written.
     """
     source = opened(bag)
     try:
