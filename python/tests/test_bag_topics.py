@@ -55,6 +55,51 @@ def encoded(encoding):
     return change
 
 
+@pytest.mark.parametrize("encoding", ["bayer_rggb8", "bayer_gbrg16"])
+def test_the_bayer_pattern_is_that_of_the_images(ours, text, tmp_path, encoding):
+    """Where the calibration has a gray camera, as those of formats that do not state it."""
+    (tmp_path / "rig.yaml").write_text(text)
+    bag = foreign(ours, tmp_path / "bayer.bag", encoded(encoding))
+    counts = bags.import_bag(bag, tmp_path / "recording", rig=tmp_path / "rig.yaml")
+    assert counts["frames"] == 14 and counts["rejected"] == 0
+    recording = spartan.open_recording(tmp_path / "recording")
+    assert {camera.layout for camera in recording.rig.cameras} == {encoding.rstrip("816")}
+    assert frames_of(recording)[0].layout == encoding.rstrip("816")
+    (tmp_path / "other.yaml").write_text(text.replace("pixel_layout: gray", "pixel_layout: bayer_bggr"))
+    with pytest.raises(spartan.Error, match="is bayer_.*, but the layout of camera .* in the rig is bayer_bggr"):
+        bags.import_bag(bag, tmp_path / "other", rig=tmp_path / "other.yaml")
+
+
+def test_no_frame_that_fits_is_an_error(ours, text, tmp_path, caplog):
+    (tmp_path / "rig.yaml").write_text(text.replace("size_px: [320, 240]", "size_px: [640, 480]"))
+    with caplog.at_level(logging.WARNING, "spartan"), pytest.raises(spartan.Error) as raised:
+        bags.import_bag(ours, tmp_path / "recording", rig=tmp_path / "rig.yaml")
+    assert raised.value.code == "input" and "is 320x240, but camera" in str(raised.value) and "640x480" in str(raised.value)
+    assert len([record for record in caplog.records if "rejected" in record.getMessage()]) == 1  # the first one
+    code, said = command("import", ours, "-o", tmp_path / "by_command", "--rig", tmp_path / "rig.yaml")
+    assert code == 3 and "no frame fits the calibration" in said
+
+
+def test_images_that_never_coincide(ours, tmp_path):
+    def change(messages, topic, message):
+        stamp = stamp_of(message) + 10**8 * ("/right/" in topic)
+        return topic, dataclasses.replace(message, header=messages.header(stamp, message.header.frame_id))
+
+    bag = foreign(ours, tmp_path / "shifted.bag", change)
+    with pytest.raises(spartan.Error, match="no left and right image have stamps within 0.005 s") as raised:
+        bags.import_bag(bag, tmp_path / "recording")
+    assert raised.value.code == "input" and "--pair-tolerance" in raised.value.hint
+
+
+def test_rgb_of_16_bits_is_refused_at_once(ours, text, tmp_path):
+    (tmp_path / "rig.yaml").write_text(text)
+    bag = foreign(ours, tmp_path / "deep.bag", encoded("rgb16"))
+    for rig in (None, tmp_path / "rig.yaml"):
+        with pytest.raises(spartan.Error, match="images of encoding 'rgb16' are not read"):
+            bags.import_bag(bag, tmp_path / "recording", rig=rig)
+        assert not (tmp_path / "recording").exists()
+
+
 @pytest.mark.parametrize("name", ["drive.bag", "drive.mcap"])
 def test_bits_of_high_alignment_go_through_a_bag(text, tmp_path, name):
     deep = text.replace("bits: 8", "bits: 12").replace("bit_alignment: low", "bit_alignment: high")

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from spartan._errors import Error
 
+# Without RGB of 16 bits, which a recording cannot hold.
 _LAYOUTS = {
     "mono8": "gray", "8UC1": "gray", "mono16": "gray", "16UC1": "gray", "rgb8": "rgb", "bgr8": "rgb", "8UC3": "rgb",
-    "rgb16": "rgb", "bgr16": "rgb",
     **{f"bayer_{pattern}{bits}": f"bayer_{pattern}" for pattern in ("rggb", "grbg", "gbrg", "bggr") for bits in (8, 16)},
 }
 

@@ -20,6 +20,15 @@ def with_readings_in_body(rig: _core.Rig) -> _core.Rig:
     return _core.Rig.from_yaml(text)
 
 
+def with_layouts(rig: _core.Rig, layouts: dict[str, str]) -> _core.Rig:
+    """The rig whose cameras, by their names, deliver images of these layouts."""
+    text = rig.to_yaml()
+    for name, layout in layouts.items():
+        camera = re.escape(json.dumps(name, ensure_ascii=False))
+        text = re.sub(rf"^(  {camera}:\n(?:    .*\n)*?    pixel_layout: ).*$", rf"\g<1>{layout}", text, flags=re.MULTILINE)
+    return _core.Rig.from_yaml(text)
+
+
 def without_masks(rig: _core.Rig) -> _core.Rig:
     """The rig without self-masks. Its geometry is the same."""
     return _core.Rig.from_yaml(_MASK.sub("", rig.to_yaml()))
