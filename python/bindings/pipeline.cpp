@@ -27,7 +27,15 @@ using namespace nb::literals;
 namespace spartan::python {
 namespace {
 
-using PipelineValue = Guarded<Pipeline>;
+// With the options by which it makes its maps.
+class PipelineValue : public Guarded<Pipeline> {
+ public:
+  PipelineValue(Pipeline pipeline, MapOptions maps) : Guarded(std::move(pipeline)), maps_(std::move(maps)) {}
+  const MapOptions& maps() const { return maps_; }
+
+ private:
+  MapOptions maps_;
+};
 
 void bind_results(nb::module_& m) {
   nb::class_<TerrainView>(m, "TerrainView", "Dense disparity of one frame with its pose.")
@@ -99,8 +107,8 @@ void bind_pipeline(nb::module_& m) {
             const RunOptions chosen = options == nullptr ? RunOptions() : *options;
             const ThreadPool workers = thread_pool(threads);
             const nb::gil_scoped_release free;
-            new (self) PipelineValue(
-                value_of(Pipeline::create(rig, chosen, workers, masks, live ? Pace::live : Pace::recorded)));
+            Pipeline made = value_of(Pipeline::create(rig, chosen, workers, masks, live ? Pace::live : Pace::recorded));
+            new (self) PipelineValue(std::move(made), resolved_options(chosen, rig).mapping.map);
           },
           "rig"_a, "options"_a.none() = nb::none(), nb::kw_only(), "threads"_a = nb::none(), "live"_a = false,
           "mask_folder"_a = "",
@@ -156,11 +164,11 @@ void bind_pipeline(nb::module_& m) {
       .def(
           "map_view",
           [](PipelineValue& self) -> std::unique_ptr<MapViewValue> {
-            return self.use([](Pipeline& p) -> std::unique_ptr<MapViewValue> {
+            return self.use([&](Pipeline& p) -> std::unique_ptr<MapViewValue> {
               GlobalMap& map = p.global_map();
               if (map.empty()) return nullptr;
               MapView seen = value_of(map.view(map.extent()));
-              Traversability shape = seen.shape(MapOptions(), ThreadPool(1));
+              Traversability shape = seen.shape(self.maps(), ThreadPool(1));
               return std::make_unique<MapViewValue>(std::move(seen), std::move(shape));
             });
           },

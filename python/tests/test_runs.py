@@ -80,6 +80,23 @@ def test_a_pipeline_gives_what_the_run_has(drive, drive_run):
     assert np.isfinite(view["elevation_m"]).any()
 
 
+def test_the_map_of_a_pipeline_has_the_costs_of_its_rover(stops, stops_run, tmp_path):
+    """All layers are those of the run with the same options, whose costs are not those of the default rover."""
+    recording, options = spartan.open_recording(stops), stops_run.options
+    options.mapping.map.rover.max_slope_deg = 5
+    options.mapping.map.rover.max_step_m = 0.03
+    options.align_rows = False
+    expected = spartan.run(stops, tmp_path / "run", options).map().view()
+    pipeline = spartan.Pipeline(recording.rig, options, threads=1)
+    for sample in recording:
+        pipeline.add(sample)
+    while pipeline.finish_stop() is not None:
+        pass
+    view = pipeline.map_view()
+    for name, layer in expected.layers.items():
+        assert np.array_equal(view[name], layer, equal_nan=True), name
+
+
 def test_the_arrays_of_a_frame_result_keep_it(drive):
     recording = spartan.open_recording(str(drive))
     options = spartan.RunOptions()
