@@ -15,6 +15,9 @@ from bag_files import rewritten, stamp_of  # noqa: E402
 from test_bag_errors import command  # noqa: E402
 import PIL.Image  # noqa: E402
 
+UP_IN_BODY = [0, 0, 9.81]
+
+
 @pytest.fixture(scope="module")
 def ours(drive, tmp_path_factory):
     path = tmp_path_factory.mktemp("ours") / "drive.bag"
@@ -53,6 +56,10 @@ def encoded(encoding):
         return topic, dataclasses.replace(message, encoding=encoding, step=data.shape[1], data=data.reshape(-1))
 
     return change
+
+
+def samples_of(folder, kind):
+    return [sample for sample in spartan.open_recording(folder) if isinstance(sample, kind)]
 
 
 @pytest.mark.parametrize("encoding", ["bayer_rggb8", "bayer_gbrg16"])
@@ -118,3 +125,94 @@ def test_bits_of_high_alignment_go_through_a_bag(text, tmp_path, name):
         for i, frame in enumerate(frames_of(recording)):
             assert (frame.bits, frame.alignment) == (12, "high")
             assert np.array_equal(frame.left, images[2 * i]) and np.array_equal(frame.right, images[2 * i + 1])
+
+
+# --- the IMU ---
+
+# x right, y down, z forward, as the optical frames of a camera, in x forward, y left, z up.
+OPTICAL = spartan.Pose.from_quaternion([-0.5, 0.5, -0.5, 0.5], [0, 0, 0])
+
+
+def in_frame(frame):
+    def change(messages, topic, message):
+        return topic, dataclasses.replace(message, header=messages.header(stamp_of(message), frame))
+
+    return change
+
+
+def reading(messages, header, frame, accel, gyro=(0.01, 0, 0)):
+    return messages.make("sensor_msgs/Imu", header=messages.header(stamp_of(type("Stamped", (), {"header": header})), frame),
+                         orientation=messages.make("geometry_msgs/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0),
+                         orientation_covariance=np.zeros(9), angular_velocity=messages.vector(gyro),
+                         angular_velocity_covariance=np.zeros(9), linear_acceleration=messages.vector(accel),
+                         linear_acceleration_covariance=np.zeros(9))
+
+
+def camera_with_imu(topics, tree=(("camera_link", "camera_imu_optical_frame", OPTICAL),)):
+    """Messages of IMUs at rest, by topic: frame, and specific force and angular rate in it; and the frames as RealSense has
+    them: the root is camera_link."""
+    def extra(messages, header):
+        frames = [("camera_link", "camera_infra1_optical_frame", OPTICAL), *tree]
+        static = messages.transforms([messages.transform(0, *each) for each in frames])
+        return [("/tf_static", static), *((topic, reading(messages, header, *imu)) for topic, imu in topics.items())]
+
+    return extra
+
+
+def imported(ours, tmp_path, topics, tree=(("camera_link", "camera_imu_optical_frame", OPTICAL),), **arguments):
+    bag = foreign(ours, tmp_path / "other.bag", in_frame("camera_infra1_optical_frame"), camera_with_imu(topics, tree))
+    bags.import_bag(bag, tmp_path / "recording", **arguments)
+    return samples_of(tmp_path / "recording", spartan.ImuSample)
+
+
+IMU_UP = ("camera_imu_optical_frame", (0, -9.81, 0))
+
+
+def test_an_imu_is_mounted_relative_to_the_left_camera(ours, tmp_path, caplog):
+    """There is no base_link; the body is the left camera, turned to x forward, y left, z up."""
+    with caplog.at_level(logging.INFO, "spartan"):
+        samples = imported(ours, tmp_path, {"/camera/imu": IMU_UP})
+    assert len(samples) == 14
+    np.testing.assert_allclose(samples[0].accel_m_s2, UP_IN_BODY, atol=1e-9)
+    np.testing.assert_allclose(samples[0].gyro_rad_s, [0, -0.01, 0], atol=1e-12)
+    assert "the IMU is /camera/imu in the frame 'camera_imu_optical_frame'" in caplog.text
+    assert "the body is the left camera" in caplog.text
+    rig = spartan.open_recording(tmp_path / "recording").rig
+    np.testing.assert_allclose(rig.body_from_camera("left").matrix(), OPTICAL.matrix(), atol=1e-12)
+
+
+def test_an_imu_on_base_link(ours, tmp_path):
+    up = spartan.Pose.from_quaternion([0, 0, 0, 1], [0.1, 0, 0.5])
+    tree = (("base_link", "camera_link", up), ("base_footprint", "base_link", up), ("base_footprint", "imu", up @ OPTICAL))
+    (sample, *_) = imported(ours, tmp_path, {"/imu/data": ("imu", (0, -9.81, 0))}, tree)
+    np.testing.assert_allclose(sample.accel_m_s2, UP_IN_BODY, atol=1e-9)
+    rig = spartan.open_recording(tmp_path / "recording").rig
+    np.testing.assert_allclose(rig.body_from_camera("left").translation, [0.1, 0, 0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize("frame", ["imu4", ""])
+def test_an_imu_that_is_not_connected_is_left_out(ours, tmp_path, caplog, frame):
+    with caplog.at_level(logging.WARNING, "spartan"):
+        assert not imported(ours, tmp_path, {"/imu0": (frame, (0, 9.81, 0))})
+    assert f"/imu0 is left out: /tf_static does not connect its frame '{frame}'" in caplog.text
+    with pytest.raises(spartan.Error, match="the mount of /imu0 is not known") as raised:
+        bags.import_bag(tmp_path / "other.bag", tmp_path / "named", imu="/imu0")
+    assert raised.value.code == "configuration" and "--rig" in raised.value.hint and not (tmp_path / "named").exists()
+
+
+def test_the_imu_that_is_connected_is_taken(ours, tmp_path):
+    samples = imported(ours, tmp_path, {"/a/imu": ("elsewhere", (1, 2, 3)), "/camera/imu": IMU_UP})
+    np.testing.assert_allclose(samples[0].accel_m_s2, UP_IN_BODY, atol=1e-9)
+
+
+def test_a_topic_of_one_quantity_is_no_imu(ours, text, tmp_path, caplog):
+    split = {"/camera/accel/sample": (*IMU_UP, (0, 0, 0)), "/camera/gyro/sample": (IMU_UP[0], (0, 0, 0))}
+    with caplog.at_level(logging.WARNING, "spartan"):
+        assert not imported(ours, tmp_path, split)
+    assert "/camera/accel/sample is left out: its messages have no angular_velocity" in caplog.text
+    assert "/camera/gyro/sample is left out: its messages have no linear_acceleration" in caplog.text
+    (tmp_path / "rig.yaml").write_text(text)
+    bags.import_bag(tmp_path / "other.bag", tmp_path / "by_rig", rig=tmp_path / "rig.yaml")
+    assert not samples_of(tmp_path / "by_rig", spartan.ImuSample)
+    with pytest.raises(spartan.Error, match="the messages of /camera/accel/sample have no angular_velocity"):
+        bags.import_bag(tmp_path / "other.bag", tmp_path / "named", imu="/camera/accel/sample")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,9 @@ from spartan import _core
 from spartan._errors import Error
 from spartan.bags._images import pixels_of
 from spartan.bags._reader import MessageReader, first_message
-from spartan.bags._topics import PairTopics, is_rectified
+from spartan.bags._topics import PairTopics, Topics, is_rectified
+
+_LOG = logging.getLogger("spartan")
 
 
 def _camera_info_yaml(message: Any, name: str, rectified: bool) -> str:
@@ -45,26 +48,65 @@ def _tf_static(bag: MessageReader) -> dict[str, tuple[str, _core.Pose]]:
                 pose = _core.Pose.from_quaternion([q.x, q.y, q.z, q.w], [t.x, t.y, t.z])
             except ValueError as error:
                 raise Error("input", f"the transform of {each.child_frame_id} is invalid: {error}", "/tf_static") from error
-            tree[each.child_frame_id.lstrip("/")] = (each.header.frame_id.lstrip("/"), pose)
+            tree[each.child_frame_id.lstrip("/")] = (_frame_of(each), pose)
     return tree
 
 
-def _pose_in(tree: dict[str, tuple[str, _core.Pose]], frame: str, root: str = "base_link") -> _core.Pose | None:
-    """root_from_frame along the tree; None where they are not connected."""
-    pose, frame, steps = _core.Pose(), frame.lstrip("/"), 0
-    while frame != root:
-        if frame not in tree or steps > len(tree):
-            return None
-        frame, parent_from_child = tree[frame][0], tree[frame][1]
-        pose, steps = parent_from_child @ pose, steps + 1
-    return pose
+def _to_root(tree: dict[str, tuple[str, _core.Pose]], frame: str) -> tuple[str, _core.Pose]:
+    """The root above a frame, and root_from_frame. Ends where the tree has a cycle."""
+    pose = _core.Pose()
+    for _ in tree:
+        if frame not in tree:
+            break
+        frame, parent_from_child = tree[frame]
+        pose = parent_from_child @ pose
+    return frame, pose
 
 
-def guessed_rig(bag: MessageReader, topics: PairTopics, imu: str | None) -> _core.Rig:
-    """Intrinsics and baseline by camera_info, mounts by /tf_static. Of topics of rectified images (is_rectified()) by P
-    alone."""
+def _between(tree: dict[str, tuple[str, _core.Pose]], a: str, b: str) -> _core.Pose | None:
+    """a_from_b along the tree; None where they are not connected."""
+    (root, root_from_a), (other, root_from_b) = _to_root(tree, a), _to_root(tree, b)
+    return root_from_a.inverse() @ root_from_b if a and root == other else None
+
+
+def _frame_of(message: Any) -> str:
+    return str(message.header.frame_id).lstrip("/")
+
+
+def _mounted(bag: MessageReader, rig: _core.Rig, left: str, topics: Topics) -> _core.Rig:
+    """The rig on the body, with the first IMU that is connected with `left`, the frame of the left images, which becomes
+    that of `topics`. The body is base_link or, where it is not known, that of the rig.
+
+    Readings of an IMU whose axes are not known are worse than none: they turn the world. Raises Error for one that is
+    named.
+    """
+    tree = _tf_static(bag)
+    base_from_left = _between(tree, "base_link", left)
+    body_from_left = base_from_left or rig.body_from_camera("left")
+    body = "base_link" if base_from_left is not None else "the left camera, turned to x forward, y left, z up"
+    _LOG.info("%s: the body is %s", bag.path, body)
+    named, topics.imu = topics.imu, None
+    for topic in topics.possible_imus if named is None else [named]:
+        frame = _frame_of(first_message(bag, topic))
+        left_from_imu = _between(tree, left, frame)
+        if left_from_imu is not None:
+            topics.imu = topic
+            _LOG.info("%s: the IMU is %s in the frame '%s', mounted by /tf_static", bag.path, topic, frame)
+            return rig.mounted(body_from_left, body_from_left @ left_from_imu)
+        what = f"/tf_static does not connect its frame '{frame}' with '{left}', that of the left images"
+        hint = "name a calibration file with --rig"
+        if named is not None:
+            raise Error("configuration", f"the mount of {topic} is not known: {what}", str(bag.path), hint)
+        _LOG.warning("%s: %s is left out: %s; %s", bag.path, topic, what, hint)
+    return rig if base_from_left is None else rig.mounted(body_from_left)
+
+
+def guessed_rig(bag: MessageReader, topics: Topics) -> _core.Rig:
+    """Intrinsics and baseline of the first pair by camera_info, mounts by /tf_static. Of topics of rectified images
+    (is_rectified()) by P alone. Chooses the IMU of `topics`."""
+    pair = topics.pairs[0]
     types, empty, files, first = bag.types(), bag.empty_topics(), [], {}
-    for side, topic in (("left", topics.left), ("right", topics.right)):
+    for side, topic in (("left", pair.left), ("right", pair.right)):
         near = topic.removesuffix("/compressed").rsplit("/", 1)[0] + "/camera_info"
         if near not in types or near in empty:
             raise Error("configuration", f"has no {near}", str(bag.path), "name a calibration file with --rig")
@@ -76,12 +118,9 @@ def guessed_rig(bag: MessageReader, topics: PairTopics, imu: str | None) -> _cor
             path.write_text(text, encoding="utf-8")
         read = _core.read_calibration(",".join(map(str, paths)), "ros").rig
     cameras = []
-    for side, topic in (("left", topics.left), ("right", topics.right)):
+    for side, topic in (("left", pair.left), ("right", pair.right)):
         pixels, layout = pixels_of(first[side], topic)
         given = read.camera(getattr(read.pairs[0], side))
         cameras.append(_core.Camera(side, given.size, given.model, layout=layout, bits=8 * pixels.dtype.itemsize))
-    rig = _core.Rig.stereo(cameras[0], cameras[1], read.right_from_left(read.pairs[0].name), topics.name)
-    tree = _tf_static(bag)
-    body_from_left = _pose_in(tree, first["left"].header.frame_id)
-    body_from_imu = _pose_in(tree, first_message(bag, imu).header.frame_id) if imu else None
-    return rig if body_from_left is None else rig.mounted(body_from_left, body_from_imu)
+    rig = _core.Rig.stereo(cameras[0], cameras[1], read.right_from_left(read.pairs[0].name), pair.name)
+    return _mounted(bag, rig, _frame_of(first["left"]), topics)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import sys
 from pathlib import Path
 
@@ -57,6 +58,8 @@ def main() -> None:
         sys.exit(f"error: {error} (pip install 'spartan[bags]')")
     try:
         if arguments.command == "import":
+            logging.basicConfig(format="%(message)s")
+            logging.getLogger("spartan").setLevel(logging.INFO)  # the topics and mounts that were chosen
             counts = bags.import_bag(
                 arguments.bag, arguments.output, left=arguments.left, right=arguments.right, imu=arguments.imu,
                 wheels=arguments.wheels, rig=arguments.rig, pair_tolerance_s=arguments.pair_tolerance)

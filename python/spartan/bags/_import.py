@@ -201,15 +201,18 @@ def _choose_rig(
     bag: MessageReader, topics: Topics, about: _Description | None, file: str | os.PathLike[str] | None
 ) -> tuple[_core.Rig, dict[str, bytes]]:
     """The rig of a file, that which Spartan wrote into the bag, or a guess, and the files of its self-masks. A single pair
-    of topics takes its name."""
+    of topics takes its name. Chooses the IMU of `topics`."""
     if file is None and about is None:
-        return guessed_rig(bag, topics.pairs[0], topics.imu), {}
+        return guessed_rig(bag, topics), {}
+    topics.imu = topics.imu or next(iter(topics.possible_imus), None)
     if file is None and about is not None:
         return about.rig, about.masks
     assert file is not None
     rig, masks = with_masks_of(_core.read_rig(file), Path(file).parent)
     if DESCRIPTION_TOPIC in bag.types():  # Spartan writes the readings of the IMU in base_link
         rig = with_readings_in_body(rig)
+    elif topics.imu is not None:
+        _LOG.info("%s: the IMU is %s, mounted by %s", bag.path, topics.imu, file)
     if len(topics.pairs) == 1:
         topics.pairs[0].name = rig.pairs[0].name
     return with_layouts(rig, _layouts_in(bag, topics, rig)), masks
@@ -235,6 +238,7 @@ def import_bag(
         pairs = [pair.name for pair in about.rig.pairs] if about is not None else None
         topics = choose_topics(source, pairs, {"left": left, "right": right, "imu": imu, "wheels": wheels})
         chosen, masks = _choose_rig(source, topics, about, rig)
+        _LOG.info("%s: %s", source.path, topics.description())
         writer = _core.RecordingWriter(
             recording, chosen, name=about.name if about is not None else Path(bag).stem,
             gravity_m_s2=about.gravity_m_s2 if about is not None else 9.81,

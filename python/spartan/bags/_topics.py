@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import logging
+from dataclasses import dataclass, field
 
 from spartan._errors import Error
+from spartan.bags._export_recording import DESCRIPTION_TOPIC
 from spartan.bags._reader import MessageReader
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _IMU, _JOINTS = "sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState"
+_LOG = logging.getLogger("spartan")
 
 
 @dataclass
@@ -30,11 +33,17 @@ class Topics:
     wheels: str | None = None  # JointState with left_m and right_m, or nav_msgs/Odometry
     compass: str | None = None
     inclinometer: str | None = None
+    possible_imus: list[str] = field(default_factory=list)  # where none is named: one is chosen with the calibration
 
     def all(self) -> set[str]:
         sensors = {self.imu, self.wheels, self.compass, self.inclinometer}
         images = {topic for pair in self.pairs for topic in (pair.left, pair.right, pair.joints)}
         return {topic for topic in sensors | images if topic is not None}
+
+    def description(self) -> str:
+        pairs = [f"pair {pair.name}: {pair.left} and {pair.right}" for pair in self.pairs]
+        sensors = {"IMU": self.imu, "wheels": self.wheels, "compass": self.compass, "inclinometer": self.inclinometer}
+        return "; ".join(pairs + [f"{name}: {topic}" for name, topic in sensors.items() if topic is not None])
 
 
 def is_rectified(topic: str) -> bool:
@@ -50,14 +59,13 @@ def _side_of(topic: str) -> str | None:
     return None
 
 
-def _of_type(types: dict[str, str], *kinds: str, word: str = "") -> str | None:
-    found = sorted(topic for topic, kind in types.items() if kind in kinds and word in topic)
-    return found[0] if found else None
+def _of_type(types: dict[str, str], kind: str, word: str) -> str | None:
+    return next((topic for topic in sorted(types) if types[topic] == kind and word in topic), None)
 
 
 def guess_topics(types: dict[str, str], pairs: list[str] | None = None) -> Topics:
-    """The topics of a bag by their types and names: images of a left and a right camera, the IMU, and, of bags that
-    Spartan wrote (whose pairs are known), wheels, compass and inclinometer."""
+    """The topics of a bag by their types and names: images of a left and a right camera, possible IMUs, and, of bags that
+    Spartan wrote, whose topics have known names, wheels, compass and inclinometer. `pairs`: of such a bag."""
     found: list[PairTopics] = []
     for name in pairs or []:
         joints = f"/{name}/joint_states"
@@ -72,8 +80,13 @@ def guess_topics(types: dict[str, str], pairs: list[str] | None = None) -> Topic
                for side, topics in sides.items()}
         if raw["left"] and raw["right"]:
             found.append(PairTopics("stereo", raw["left"][0], raw["right"][0]))
-    return Topics(found, _of_type(types, _IMU), _of_type(types, _JOINTS, word="/wheels"),
-                  _of_type(types, _JOINTS, word="/compass"), _of_type(types, _JOINTS, word="/inclinometer"))
+    if DESCRIPTION_TOPIC not in types:
+        imus = sorted(topic for topic, kind in types.items() if kind == _IMU)
+        return Topics(found, None, _of_type(types, _JOINTS, "/wheels"), _of_type(types, _JOINTS, "/compass"),
+                      _of_type(types, _JOINTS, "/inclinometer"), imus)
+    wheels, compass, inclinometer = (_of_type(types, _JOINTS, topic) for topic in ("/wheels", "/compass", "/inclinometer"))
+    imus = ["/imu"] if types.get("/imu") == _IMU else []
+    return Topics(found, wheels=wheels, compass=compass, inclinometer=inclinometer, possible_imus=imus)
 
 
 def _check_topics(bag: MessageReader, topics: Topics) -> None:
@@ -92,6 +105,30 @@ def _check_topics(bag: MessageReader, topics: Topics) -> None:
             raise Error("input", f"the topic {topic} is of {types[topic]}, not of {' or '.join(kinds)}", where, known)
 
 
+def _unmeasured(bag: MessageReader, topic: str) -> str:
+    """What the messages of an IMU do not contain: one of the two quantities is 0 in all messages of drivers that publish
+    gyroscopes and accelerometers on topics of their own. Empty for a whole IMU."""
+    unmeasured = {"angular_velocity", "linear_acceleration"}
+    for _, message in bag.messages({topic}):
+        unmeasured -= {name for name in unmeasured if any(abs(getattr(getattr(message, name), axis)) > 0 for axis in "xyz")}
+        if not unmeasured:
+            break
+    return " and ".join(sorted(unmeasured))
+
+
+def _check_imus(bag: MessageReader, topics: Topics) -> None:
+    """Removes possible IMUs that lack a quantity. Raises Error where one is named."""
+    if DESCRIPTION_TOPIC in bag.types():
+        return  # of Spartan, by whatever IMU
+    hint = "both on one topic are needed, as by unite_imu_method of the driver of RealSense"
+    if topics.imu is not None and (nothing := _unmeasured(bag, topics.imu)):
+        raise Error("input", f"the messages of {topics.imu} have no {nothing}", str(bag.path), hint)
+    for topic in list(topics.possible_imus):
+        if nothing := _unmeasured(bag, topic):
+            _LOG.warning("%s: %s is left out: its messages have no %s (%s)", bag.path, topic, nothing, hint)
+            topics.possible_imus.remove(topic)
+
+
 def choose_topics(bag: MessageReader, pairs: list[str] | None, wanted: dict[str, str | None]) -> Topics:
     """The topics that were named, and guesses for the others. Raises Error where the bag has not got them."""
     types, empty = bag.types(), bag.empty_topics()
@@ -99,10 +136,13 @@ def choose_topics(bag: MessageReader, pairs: list[str] | None, wanted: dict[str,
     topics = guess_topics(filled, pairs)
     if wanted["left"] is not None and wanted["right"] is not None:
         topics.pairs = [PairTopics("stereo", wanted["left"], wanted["right"])]
-    topics.imu, topics.wheels = wanted["imu"] or topics.imu, wanted["wheels"] or topics.wheels
+    topics.wheels = wanted["wheels"] or topics.wheels
+    if wanted["imu"] is not None:
+        topics.imu, topics.possible_imus = wanted["imu"], []
     topics.pairs = [pair for pair in topics.pairs if pair.left in filled and pair.right in filled] or topics.pairs
     if not topics.pairs:
         hint = f"its topics: {', '.join(sorted(types))}; name them with --left and --right"
         raise Error("input", "has no images of a left and a right camera", str(bag.path), hint)
     _check_topics(bag, topics)
+    _check_imus(bag, topics)
     return topics
