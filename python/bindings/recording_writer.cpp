@@ -5,9 +5,11 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
 
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "bindings/bindings.h"
 #include "bindings/errors.h"
@@ -22,7 +24,31 @@ using namespace nb::literals;
 namespace spartan::python {
 namespace {
 
-using WriterValue = Guarded<RecordingWriter>;
+constexpr std::chrono::seconds kSyncEvery{1};
+
+// Lists what was added every second, so that a program that ends without finish() leaves an unfinished recording.
+class SyncingWriter {
+ public:
+  explicit SyncingWriter(RecordingWriter writer) : writer_(std::move(writer)) {}
+
+  template <class AnySample>
+  Status add(const AnySample& sample) {
+    if (Status added = writer_.add(sample); !added) return added;
+    return std::chrono::steady_clock::now() < next_sync_ ? Status() : sync();
+  }
+  Status sync() {
+    Status synced = writer_.sync();
+    next_sync_ = std::chrono::steady_clock::now() + kSyncEvery;
+    return synced;
+  }
+  Status finish() { return writer_.finish(); }
+
+ private:
+  RecordingWriter writer_;
+  std::chrono::steady_clock::time_point next_sync_ = std::chrono::steady_clock::now() + kSyncEvery;
+};
+
+using WriterValue = Guarded<SyncingWriter>;
 
 void start_recording(WriterValue* self, const PathText& folder, const Rig& rig, const std::string& name,
                      const std::string& description, double gravity, const SensorNoise* noise) {
@@ -32,19 +58,21 @@ void start_recording(WriterValue* self, const PathText& folder, const Rig& rig, 
   options.gravity_m_s2 = gravity;
   if (noise != nullptr) options.noise = *noise;
   const nb::gil_scoped_release free;
-  new (self) WriterValue(value_of(RecordingWriter::create_batched(folder, rig, options, ImageFiles::pnm)));
+  new (self)
+      WriterValue(SyncingWriter(value_of(RecordingWriter::create_batched(folder, rig, options, ImageFiles::pnm))));
 }
 
 template <class AnySample>
 void append(WriterValue& self, const AnySample& sample) {
-  check(self.use([&](RecordingWriter& writer) { return writer.add(sample); }));
+  check(self.use([&](SyncingWriter& writer) { return writer.add(sample); }));
+}
+
+void sync_recording(WriterValue& self) {
+  check(self.use([](SyncingWriter& writer) { return writer.sync(); }));
 }
 
 void finish_recording(WriterValue& self) {
-  check(self.use([](RecordingWriter& writer) {
-    Status synced = writer.sync();
-    return synced ? writer.finish() : synced;
-  }));
+  check(self.use([](SyncingWriter& writer) { return writer.finish(); }));
 }
 
 }  // namespace
@@ -68,6 +96,9 @@ void bind_recording_writer(nb::module_& m) {
       .def("add", append<WheelSample>, "sample"_a)
       .def("add", append<CompassSample>, "sample"_a)
       .def("add", append<InclinometerSample>, "sample"_a)
+      .def("sync", sync_recording,
+           "Flushes what was added to the disk; done every second. A program that ends without finish() leaves an "
+           "unfinished recording with the samples up to here.")
       .def("finish", finish_recording, "Writes what is left; the recording is complete then.");
 }
 

@@ -17,6 +17,7 @@ import spartan
 
 bags = pytest.importorskip("spartan.bags")
 from bag_files import rewritten  # noqa: E402
+from conftest import frames_of  # noqa: E402
 
 KINDS = [("drive.bag", "sqlite3"), ("drive", "sqlite3"), ("drive", "mcap"), ("drive.mcap", "foxglove")]
 
@@ -94,6 +95,7 @@ def test_compressed_images_that_cannot_be_decoded(drive, tmp_path, data):
     with pytest.raises(spartan.Error, match="/image_raw/compressed: the image of stamp .* cannot be decoded") as raised:
         bags.import_bag(tmp_path / "other.bag", tmp_path / "recording")
     assert raised.value.code == "input" and raised.value.hint
+    assert len(frames_of(spartan.open_recording(tmp_path / "recording"))) == 2  # what was imported before
 
 
 @pytest.mark.parametrize("storage", ["sqlite3", "mcap"])

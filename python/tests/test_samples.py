@@ -134,6 +134,27 @@ def test_an_iterator_outlives_the_name_of_its_recording(drive):
     assert sum(1 for _ in iterator) > 0
 
 
+def test_an_unfinished_recording_has_what_was_synced(drive, tmp_path):
+    """By sync(), and by a second that has passed; also if the program ends without finish()."""
+    source = spartan.open_recording(drive)
+    frames = frames_of(source)
+    writer = spartan.RecordingWriter(tmp_path / "recording", source.rig)
+
+    def listed():
+        return len(frames_of(spartan.open_recording(tmp_path / "recording")))
+
+    for frame in frames[:2]:
+        writer.add(frame)
+    writer.sync()
+    assert listed() == 2
+    writer.add(frames[2])
+    time.sleep(1.1)
+    writer.add(frames[3])
+    assert listed() == 4
+    writer.finish()
+    assert listed() == 4
+
+
 def test_an_error_says_what_to_do():
     with pytest.raises(spartan.Error) as raised:
         spartan.open_recording("/no/such/folder")

@@ -7,6 +7,7 @@ import json
 import logging
 import os
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -230,7 +231,7 @@ def import_bag(
     sensors, and `rejected` ones, whose stamps do not increase or whose images do not fit the calibration. Raises Error;
     with the code `usage` for arguments that do not fit, `input` where the bag is damaged, a topic is missing or empty, or
     no frame can be made, `configuration` where the calibration does not fit the topics, and `output` where the recording
-    cannot be written.
+    cannot be written. After an error what was imported before is an unfinished recording.
     """
     source = opened(bag)
     try:
@@ -245,8 +246,13 @@ def import_bag(
             noise=about.noise if about is not None and rig is None else _core.SensorNoise())
         write_masks(Path(recording), masks)
         importer = _Importer(writer, chosen, topics, round(1e9 * pair_tolerance_s))
-        for topic, message in source.messages(topics.all()):
-            importer.take(topic, message)
-        return importer.finish()
+        try:
+            for topic, message in source.messages(topics.all()):
+                importer.take(topic, message)
+            return importer.finish()
+        except BaseException:
+            with suppress(Error):  # the first error counts
+                writer.sync()
+            raise
     finally:
         source.close()
