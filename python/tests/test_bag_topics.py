@@ -216,3 +216,22 @@ def test_a_topic_of_one_quantity_is_no_imu(ours, text, tmp_path, caplog):
     assert not samples_of(tmp_path / "by_rig", spartan.ImuSample)
     with pytest.raises(spartan.Error, match="the messages of /camera/accel/sample have no angular_velocity"):
         bags.import_bag(tmp_path / "other.bag", tmp_path / "named", imu="/camera/accel/sample")
+
+
+# --- arguments ---
+
+def test_a_calibration_with_other_pairs(stops, text, tmp_path):
+    """The bag has a narrow and a wide pair."""
+    bags.export_recording(stops, tmp_path / "stops.bag")
+    (tmp_path / "rig.yaml").write_text(text)
+    code, said = command("import", tmp_path / "stops.bag", "-o", tmp_path / "recording", "--rig", tmp_path / "rig.yaml")
+    assert code == 4 and "has no pair" in said and "narrow" in said and "its pairs: stereo" in said
+    assert not (tmp_path / "recording").exists()
+
+
+@pytest.mark.parametrize("arguments, words", [
+    (("--pair-tolerance", "nan"), "must be 0 to 1 s"), (("--pair-tolerance", "-1"), "must be 0 to 1 s"),
+    (("--pair-tolerance", "1.5"), "must be 0 to 1 s")])
+def test_arguments_that_do_not_fit(ours, tmp_path, arguments, words):
+    code, said = command("import", ours, "-o", tmp_path / "recording", *arguments)
+    assert code == 2 and words in said and not (tmp_path / "recording").exists()

@@ -214,8 +214,11 @@ def _choose_rig(
         rig = with_readings_in_body(rig)
     elif topics.imu is not None:
         _LOG.info("%s: the IMU is %s, mounted by %s", bag.path, topics.imu, file)
-    if len(topics.pairs) == 1:
-        topics.pairs[0].name = rig.pairs[0].name
+    names = [pair.name for pair in rig.pairs]
+    if len(topics.pairs) == 1 and names and topics.pairs[0].name not in names:
+        topics.pairs[0].name = names[0]
+    if missing := [pair.name for pair in topics.pairs if pair.name not in names]:
+        raise Error("configuration", f"has no pair {', '.join(missing)}", str(file), f"its pairs: {', '.join(names) or 'none'}")
     return with_layouts(rig, _layouts_in(bag, topics, rig)), masks
 
 
@@ -233,6 +236,8 @@ def import_bag(
     no frame can be made, `configuration` where the calibration does not fit the topics, and `output` where the recording
     cannot be written. After an error what was imported before is an unfinished recording.
     """
+    if not 0 <= pair_tolerance_s <= 1:
+        raise Error("usage", f"is {pair_tolerance_s} s, must be 0 to 1 s", "pair tolerance")
     source = opened(bag)
     try:
         about = _description_in(source) if left is None and right is None else None
