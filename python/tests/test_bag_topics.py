@@ -107,6 +107,20 @@ def test_rgb_of_16_bits_is_refused_at_once(ours, text, tmp_path):
         assert not (tmp_path / "recording").exists()
 
 
+@pytest.mark.parametrize("format_, codec, layout", [
+    ("bayer_rggb8; png compressed ", "png", "bayer_rggb"), ("bayer_grbg8; jpeg compressed ", "jpeg", "bayer_grbg"),
+    ("mono8; png compressed ", "png", "gray"), ("png", "png", "gray")])
+def test_the_layout_of_compressed_images(ours, tmp_path, format_, codec, layout):
+    def change(messages, topic, message):
+        file = io.BytesIO()
+        PIL.Image.fromarray(np.array(message.data).reshape(message.height, message.width)).save(file, codec)
+        return f"{topic}/compressed", messages.make("sensor_msgs/CompressedImage", header=message.header, format=format_,
+                                                    data=np.frombuffer(file.getvalue(), np.uint8))
+
+    bags.import_bag(foreign(ours, tmp_path / "small.bag", change), tmp_path / "recording")
+    assert frames_of(spartan.open_recording(tmp_path / "recording"))[0].layout == layout
+
+
 @pytest.mark.parametrize("name", ["drive.bag", "drive.mcap"])
 def test_bits_of_high_alignment_go_through_a_bag(text, tmp_path, name):
     deep = text.replace("bits: 8", "bits: 12").replace("bit_alignment: low", "bit_alignment: high")

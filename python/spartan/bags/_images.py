@@ -58,4 +58,7 @@ def pixels_of(message: Any, topic: str) -> tuple[npt.NDArray[Any], str]:
     except Exception as error:  # of PIL, whose decoders raise many kinds, or of a damaged message
         raise Error("input", f"the image of stamp {stamp_of(message)} ns cannot be decoded: {error}", topic,
                     "the bag is damaged there; record it again, or filter this message out") from error
-    return pixels, layout or ("rgb" if pixels.ndim == 3 else "gray")
+    if compressed:  # "bayer_rggb8; png compressed ": the encoding before compression, or a codec alone
+        encoded = _LAYOUTS.get(message.format.split(";")[0].strip(), "gray")
+        layout = "rgb" if pixels.ndim == 3 else encoded if encoded.startswith("bayer") else "gray"
+    return pixels, layout
