@@ -245,7 +245,14 @@ def test_a_calibration_with_other_pairs(stops, text, tmp_path):
 
 @pytest.mark.parametrize("arguments, words", [
     (("--pair-tolerance", "nan"), "must be 0 to 1 s"), (("--pair-tolerance", "-1"), "must be 0 to 1 s"),
-    (("--pair-tolerance", "1.5"), "must be 0 to 1 s")])
+    (("--pair-tolerance", "1.5"), "must be 0 to 1 s"), (("--left", "/stereo/left/image_raw"), "name --left and --right"),
+    (("--right", "/stereo/right/image_raw"), "name --left and --right")])
 def test_arguments_that_do_not_fit(ours, tmp_path, arguments, words):
     code, said = command("import", ours, "-o", tmp_path / "recording", *arguments)
     assert code == 2 and words in said and not (tmp_path / "recording").exists()
+
+
+def test_only_rerun_gets_images_of_the_recording(drive, drive_run, tmp_path):
+    for source in (drive, drive_run.path):
+        code, said = command("export", source, "-o", tmp_path / "out.bag", "--recording", tmp_path / "none")
+        assert code == 2 and "only .rrd files" in said and not (tmp_path / "out.bag").exists()

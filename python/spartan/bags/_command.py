@@ -39,7 +39,10 @@ def _export(arguments: argparse.Namespace) -> None:
     from spartan import bags
 
     is_run = (Path(arguments.input) / "run.sqlite").exists()
-    if Path(arguments.output).suffix == ".rrd":
+    rerun = Path(arguments.output).suffix == ".rrd"
+    if arguments.recording is not None and not rerun:
+        raise Error("usage", "only .rrd files get images of the recording", "--recording", "leave it out")
+    if rerun:
         if not is_run:
             raise Error("usage", "is not a run: only runs become recordings of Rerun", arguments.input)
         bags.export_rerun(arguments.input, arguments.output, recording=arguments.recording)

@@ -236,6 +236,8 @@ def import_bag(
     no frame can be made, `configuration` where the calibration does not fit the topics, and `output` where the recording
     cannot be written. After an error what was imported before is an unfinished recording.
     """
+    if (left is None) != (right is None):
+        raise Error("usage", "is named without the topic of the other camera", str(left or right), "name --left and --right")
     if not 0 <= pair_tolerance_s <= 1:
         raise Error("usage", f"is {pair_tolerance_s} s, must be 0 to 1 s", "pair tolerance")
     source = opened(bag)
