@@ -232,6 +232,18 @@ def test_a_topic_of_one_quantity_is_no_imu(ours, text, tmp_path, caplog):
         bags.import_bag(tmp_path / "other.bag", tmp_path / "named", imu="/camera/accel/sample")
 
 
+def test_joints_of_other_programs_are_not_sensors(ours, tmp_path):
+    def extra(messages, header):
+        joints = dict(name=["fl", "fr"], position=np.array([1.0, 2.0]), velocity=np.zeros(0), effort=np.zeros(0))
+        return [(topic, messages.make("sensor_msgs/JointState", header=header, **joints))
+                for topic in ("/wheels", "/front/wheels/joint_states", "/compass/state", "/inclinometer")]
+
+    bag = foreign(ours, tmp_path / "other.bag", extra=extra)
+    assert bags.import_bag(bag, tmp_path / "recording")["samples"] == 0
+    with pytest.raises(spartan.Error, match="a message has no joint 'left_m'"):
+        bags.import_bag(bag, tmp_path / "named", wheels="/wheels")
+
+
 # --- arguments ---
 
 def test_a_calibration_with_other_pairs(stops, text, tmp_path):

@@ -59,10 +59,6 @@ def _side_of(topic: str) -> str | None:
     return None
 
 
-def _of_type(types: dict[str, str], kind: str, word: str) -> str | None:
-    return next((topic for topic in sorted(types) if types[topic] == kind and word in topic), None)
-
-
 def guess_topics(types: dict[str, str], pairs: list[str] | None = None) -> Topics:
     """The topics of a bag by their types and names: images of a left and a right camera, possible IMUs, and, of bags that
     Spartan wrote, whose topics have known names, wheels, compass and inclinometer. `pairs`: of such a bag."""
@@ -81,10 +77,9 @@ def guess_topics(types: dict[str, str], pairs: list[str] | None = None) -> Topic
         if raw["left"] and raw["right"]:
             found.append(PairTopics("stereo", raw["left"][0], raw["right"][0]))
     if DESCRIPTION_TOPIC not in types:
-        imus = sorted(topic for topic, kind in types.items() if kind == _IMU)
-        return Topics(found, None, _of_type(types, _JOINTS, "/wheels"), _of_type(types, _JOINTS, "/compass"),
-                      _of_type(types, _JOINTS, "/inclinometer"), imus)
-    wheels, compass, inclinometer = (_of_type(types, _JOINTS, topic) for topic in ("/wheels", "/compass", "/inclinometer"))
+        return Topics(found, possible_imus=sorted(topic for topic, kind in types.items() if kind == _IMU))
+    wheels, compass, inclinometer = (topic if types.get(topic) == _JOINTS else None
+                                     for topic in ("/wheels", "/compass", "/inclinometer"))
     imus = ["/imu"] if types.get("/imu") == _IMU else []
     return Topics(found, wheels=wheels, compass=compass, inclinometer=inclinometer, possible_imus=imus)
 
