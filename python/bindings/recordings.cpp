@@ -7,6 +7,7 @@
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
+#include <string>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -27,6 +28,14 @@ nb::object object_of(Sample sample) {
 
 namespace {
 
+// Raises ValueError for a value out of bounds, and for NaN. 0 is allowed where it means that nothing is stated.
+void check_range(const char* name, double value, double least, double most, bool or_zero) {
+  if ((value >= least && value <= most) || (or_zero && value == 0)) return;
+  const std::string text =
+      fmt::format("{} = {}: must be {} to {}{}", name, value, least, most, or_zero ? ", or 0" : "");
+  throw nb::value_error(text.c_str());
+}
+
 OpenOptions open_options(const std::optional<PathText>& rig, const std::optional<std::string>& format,
                          const std::optional<std::string>& left, const std::optional<std::string>& right,
                          const std::optional<PathText>& times, double fps, int bits, double pair_tolerance_s) {
@@ -36,9 +45,11 @@ OpenOptions open_options(const std::optional<PathText>& rig, const std::optional
   open.left_images = left.value_or("");
   open.right_images = right.value_or("");
   if (times) open.times_file = *times;
+  check_range("fps", fps, OpenOptions::kLeastFps, OpenOptions::kMostFps, true);
+  check_range("bits", bits, OpenOptions::kLeastBits, OpenOptions::kMostBits, true);
+  check_range("pair_tolerance_s", pair_tolerance_s, 0, OpenOptions::kMostPairTolerance_s, false);
   open.fps = fps;
   open.bits = bits;
-  if (!(pair_tolerance_s >= 0)) throw nb::value_error("pair_tolerance_s: must not be negative");
   open.pair_tolerance_s = pair_tolerance_s;
   return open;
 }
@@ -147,9 +158,9 @@ void bind_recordings(nb::module_& m) {
       "Opens a folder or a video file; the layout (Spartan, KITTI, EuRoC, image folders …) is detected. `rig`: a "
       "calibration file to use instead of the recording's own. `left`, `right`: folders or patterns of file names of "
       "the images. `times`: file with the times of the frames, instead of the recording's own; `fps`: frames per "
-      "second where there are none. `bits`: significant bits of a sample of 16-bit images; 0: by the calibration or "
-      "the images. `pair_tolerance_s`: largest difference of the stamps of left and right. A recording that is not "
-      "finished has the frames that it has now.");
+      "second where there are none, 0.001 to 10000. `bits`: significant bits of a sample of 16-bit images, 9 to 16; 0: "
+      "by the calibration or the images. `pair_tolerance_s`: largest difference of the stamps of left and right, 0 to "
+      "1. A recording that is not finished has the frames that it has now.");
 }
 
 }  // namespace spartan::python

@@ -155,6 +155,19 @@ def test_an_unfinished_recording_has_what_was_synced(drive, tmp_path):
     assert listed() == 4
 
 
+@pytest.mark.parametrize("name, values", [
+    ("fps", [-1, 1e-300, 10001, float("inf"), float("nan")]), ("bits", [-3, 5, 8, 17]),
+    ("pair_tolerance_s", [-1, 1.5, float("inf"), float("nan")])])
+def test_how_to_read_a_recording_has_the_bounds_of_the_program(drive, tmp_path, name, values):
+    for value in values:
+        with pytest.raises(ValueError, match=f"{name} = .*: must be"):
+            spartan.open_recording(drive, **{name: value})
+        with pytest.raises(ValueError, match=f"{name} = .*: must be"):
+            spartan.run(drive, tmp_path / "run", **{name: value})
+    assert not (tmp_path / "run").exists()
+    spartan.open_recording(drive, fps=0.001, bits=16, pair_tolerance_s=0)
+
+
 def test_an_error_says_what_to_do():
     with pytest.raises(spartan.Error) as raised:
         spartan.open_recording("/no/such/folder")

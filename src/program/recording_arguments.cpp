@@ -20,16 +20,16 @@ void add_recorded_frames_options(CLI::App& command, RecordingArguments& a) {
       "File of frame times, one a row, alone or beside file names: decimal seconds, or integers of s, ms, us "
       "or ns, which is found by their size and printed (default: times.txt of the recording, else the file names).");
   command.add_option("--fps", a.fps, "Frames per second, instead of times (default: times of the recording).")
-      ->check(CLI::Range(0.001, 10000.0));
+      ->check(CLI::Range(OpenOptions::kLeastFps, OpenOptions::kMostFps));
   command
       .add_option("--bits", a.bits,
                   "Significant bits of the samples of 16-bit images (default: by the calibration, else by the images).")
-      ->check(CLI::Range(9, 16));
+      ->check(CLI::Range(OpenOptions::kLeastBits, OpenOptions::kMostBits));
   command
       .add_option("--pair-tolerance", a.pair_tolerance_s,
                   "Largest difference in seconds of the time stamps of the two images of a frame (default 0.005); "
                   "raising it pairs images of cameras that are not triggered together.")
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(CLI::Range(0.0, OpenOptions::kMostPairTolerance_s));
 }
 
 Result<OpenOptions> open_options(const RecordingArguments& a) {

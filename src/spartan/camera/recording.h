@@ -104,6 +104,10 @@ struct OpenOptions {
   double fps = 0;            ///< frames per second, instead of the recording's own times; 0: not stated
   int bits = 0;              ///< significant bits of a sample of 16-bit images; 0: by the calibration or the images
   bool unfinished = false;   ///< accept a recording that is being made, with the frames that it has now
+
+  /// Bounds of what a user states.
+  static constexpr double kLeastFps = 0.001, kMostFps = 10000, kMostPairTolerance_s = 1;
+  static constexpr int kLeastBits = 9, kMostBits = 16;
 };
 
 /// Opens a recording: a folder, or a video file with the left and the right image side by side. Codes: `input`
