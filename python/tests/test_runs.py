@@ -1,6 +1,5 @@
 """Pipelines, runs, maps, evaluation and simulation."""
 
-import csv
 import filecmp
 import gc
 import logging
@@ -289,35 +288,6 @@ def test_a_report_that_fails_does_not_fail_the_run(drive, tmp_path, caplog):
     run = spartan.run(drive, tmp_path / "run", max_frames=2, report=True, truth=tmp_path / "none.txt")
     assert len(run.frames) == 2
     assert "no report was written" in caplog.text and "none.txt" in caplog.text
-
-
-@pytest.mark.parametrize("kind", ["odometry", "localization"])
-def test_exported_trajectories_are_read_by_others(drive_run, tmp_path, kind):
-    """TUM, EuRoC and KITTI by evo, csv by the module csv."""
-    from evo.tools import file_interface
-
-    ours = drive_run.trajectory(kind)
-    for name in ("tum", "euroc", "kitti", "csv"):
-        drive_run.export(name, tmp_path / name, trajectory=kind)
-    stamped = [file_interface.read_tum_trajectory_file(str(tmp_path / "tum")),
-               file_interface.read_euroc_csv_trajectory(str(tmp_path / "euroc"))]
-    for read in stamped:
-        assert np.allclose(read.timestamps, np.array(ours.stamps_ns) / 1e9, rtol=0, atol=1e-9)
-        assert np.allclose(read.positions_xyz, ours.positions, rtol=0, atol=1e-9)
-        assert np.allclose(read.orientations_quat_wxyz, np.roll(ours.quaternions_xyzw, 1, axis=1), rtol=0, atol=1e-9)
-    with open(tmp_path / "csv", encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert [int(row["stamp_ns"]) for row in rows] == list(ours.stamps_ns)
-    numbers = [[float(row[key]) for key in ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")] for row in rows]
-    assert np.allclose(numbers, np.hstack([ours.positions, ours.quaternions_xyzw]), rtol=0, atol=1e-9)
-    sigma = np.sqrt(np.diagonal(drive_run.covariances(kind), axis1=1, axis2=2))
-    names = ("sigma_x_m", "sigma_y_m", "sigma_z_m", "sigma_rx_rad", "sigma_ry_rad", "sigma_rz_rad")
-    assert np.allclose([[float(row[key]) for key in names] for row in rows], sigma, rtol=1e-4)
-    # KITTI's poses have no stamps, and begin at the first left camera: the motions between the poses are the same.
-    kitti = file_interface.read_kitti_poses_file(str(tmp_path / "kitti")).poses_se3
-    lengths = [np.linalg.norm(np.diff(np.array([pose[:3, 3] for pose in poses]), axis=0), axis=1)
-               for poses in (kitti, [pose.pose.matrix() for pose in ours])]
-    assert len(kitti) == len(ours) and np.allclose(*lengths, rtol=0, atol=1e-6)
 
 
 def test_evaluation_is_that_of_evo(drive, drive_run, tmp_path):

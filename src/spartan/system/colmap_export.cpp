@@ -85,6 +85,29 @@ Status add_frame(const FrameRecord& frame, const Pose& world_from_body, Recordin
   return {};
 }
 
+// The points of all terrain views in the world of a trajectory; files have them in that of the localization. Views of
+// frames without a pose in both are left out.
+Result<PointCloud> terrain_in_world_of(TrajectoryKind kind, const std::vector<FrameRecord>& frames,
+                                       const std::vector<TerrainRecord>& terrain, const std::string& folder) {
+  PointCloud all;
+  for (const TerrainRecord& view : terrain) {
+    const auto frame = std::find_if(frames.begin(), frames.end(), [&](const FrameRecord& each) {
+      return each.stamp == view.stamp && each.pair == view.pair;
+    });
+    if (frame == frames.end()) continue;
+    const auto pose = pose_of(*frame, kind), localized = pose_of(*frame, TrajectoryKind::localization);
+    if (!pose || !localized) continue;
+    auto cloud = terrain_cloud(folder, {view});
+    if (!cloud) return cloud;
+    if (kind != TrajectoryKind::localization) {
+      const Pose moved = pose->pose * localized->pose.inverse();
+      for (ColouredPoint& point : *cloud) point.position = (moved * point.position.cast<double>()).cast<float>();
+    }
+    all.insert(all.end(), cloud->begin(), cloud->end());
+  }
+  return all;
+}
+
 Status write_model(const ColmapModel& model, const fs::path& folder) {
   const fs::path files = folder / "sparse" / "0";
   const std::pair<const char*, const std::string*> texts[] = {
@@ -131,11 +154,9 @@ Result<int> export_colmap(const std::string& run_folder, Recording& recording, s
   }
   const auto terrain = store->terrain();
   if (!terrain) return failure(terrain);
-  if (!terrain->empty()) {
-    const auto cloud = terrain_cloud(folder.terrain(), *terrain);
-    if (!cloud) return failure(cloud);
-    add_points(*cloud, model);
-  }
+  const auto cloud = terrain_in_world_of(*chosen, *frames, *terrain, folder.terrain());
+  if (!cloud) return failure(cloud);
+  add_points(*cloud, model);
   if (Status s = write_model(model, path); !s) return failure(s);
   return model.image_count;
 }
