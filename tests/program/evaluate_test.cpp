@@ -111,10 +111,11 @@ TEST_F(Evaluate, FilesAreComparedAsTheyAre) {
   EXPECT_THAT(j["reasons"]["nees"].get<std::string>(), HasSubstr("odometry of a run"));
 }
 
-TEST_F(Evaluate, RecordingsOfSpartanAndEuroc) {
+TEST_F(Evaluate, RecordingsOfSpartanEurocAndTumVi) {
   folder_.write("own/truth/poses.tum", to_tum(bend(1)));
   folder_.write("euroc/mav0/state_groundtruth_estimate0/data.csv", to_euroc(bend(1)));
-  for (const char* recording : {"own", "euroc"}) {
+  folder_.write("tum_vi/mav0/mocap0/data.csv", to_euroc(bend(1)));
+  for (const char* recording : {"own", "euroc", "tum_vi", "tum_vi/mav0"}) {
     const json j = evaluate({path("truth.tum"), "--truth", path(recording)});
     EXPECT_EQ(j["frames"], 61) << recording;
     EXPECT_NEAR(j["ate_m"]["max"].get<double>(), 0, 1e-6) << recording;

@@ -291,6 +291,31 @@ TEST_F(EurocLayout, ReadsTheNoiseOfTheImu) {
   EXPECT_THAT(error_message(""), HasSubstr("imu0/sensor.yaml"));
 }
 
+// One camchain for both cameras beside mav0, and the truth of motion capture.
+TEST_F(EurocLayout, OfTumVi) {
+  for (const int camera : {0, 1}) remove(fmt::format("mav0/cam{}/sensor.yaml", camera));
+  const auto moved = [](double x) {
+    return fmt::format("[[1, 0, 0, {}], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n", x);
+  };
+  std::string camchain;
+  for (const int camera : {0, 1}) {
+    camchain += fmt::format("cam{}:\n  camera_model: pinhole\n  distortion_coeffs: [0, 0, 0, 0]\n", camera);
+    camchain += "  distortion_model: equidistant\n  intrinsics: [30, 30, 16, 8]\n  resolution: [32, 16]\n";
+    camchain += "  T_cam_imu: " + moved(-0.1 * camera);
+    if (camera == 1) camchain += "  T_cn_cnm1: " + moved(-0.1);
+  }
+  folder_.write("dso/camchain.yaml", camchain);
+  EXPECT_EQ(open()->info().truth_file, "");
+  folder_.write(
+      "mav0/mocap0/data.csv",
+      "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []\n"
+      "1000000,1,2,3,1,0,0,0\n");
+  EXPECT_EQ(open()->info().truth_file, folder_.path() + "/mav0/mocap0/data.csv");
+  EXPECT_THAT(open()->info().rig_source, HasSubstr("dso/camchain.yaml"));
+  folder_.write("mav0/state_groundtruth_estimate0/data.csv", "#timestamp\n");
+  EXPECT_THAT(open()->info().truth_file, HasSubstr("state_groundtruth_estimate0"));
+}
+
 TEST_F(EurocLayout, ErrorsNameFileAndLine) {
   folder_.write("mav0/cam1/data.csv", "#timestamp [ns],filename\n1000000,1000000.png\nsoon,2000000.png\n");
   EXPECT_THAT(rejection(), HasSubstr("cam1/data.csv:3: the first column is not a time in nanoseconds"));

@@ -76,11 +76,12 @@ Result<Estimate> load_estimate(const std::string& path, const std::string& kind)
 Result<std::string> find_truth(const std::string& path) {
   if (!is_folder(path)) return path;
   for (const char* name : {"truth/poses.tum", "poses.txt", "mav0/state_groundtruth_estimate0/data.csv",
-                           "state_groundtruth_estimate0/data.csv"}) {
+                           "state_groundtruth_estimate0/data.csv", "mav0/mocap0/data.csv", "mocap0/data.csv"}) {
     if (is_there(fs::path(path) / name)) return (fs::path(path) / name).string();
   }
   return failure(ErrorCode::input, "is a folder without a ground-truth trajectory", path,
-                 "expected truth/poses.tum, poses.txt or mav0/state_groundtruth_estimate0/data.csv");
+                 "expected truth/poses.tum, poses.txt, mav0/state_groundtruth_estimate0/data.csv or "
+                 "mav0/mocap0/data.csv");
 }
 
 void copy_stamps(Trajectory& to, const Trajectory& from) {

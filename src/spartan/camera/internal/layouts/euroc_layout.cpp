@@ -138,8 +138,9 @@ Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions
     index.frames.push_back(std::move(entry));
   }
   std::error_code error;
-  if (const fs::path truth = folder / "state_groundtruth_estimate0" / "data.csv"; fs::exists(truth, error)) {
-    index.info.truth_file = truth.string();
+  for (const char* name : {"state_groundtruth_estimate0", "mocap0"}) {  // EuRoC, TUM-VI
+    const fs::path truth = folder / name / "data.csv";
+    if (index.info.truth_file.empty() && fs::exists(truth, error)) index.info.truth_file = truth.string();
   }
   if (const fs::path imu = folder / "imu0" / "data.csv"; fs::exists(imu, error)) {
     const auto about = read_imu((folder / "imu0" / "sensor.yaml").string());
