@@ -3,6 +3,7 @@ import posixpath
 import re
 from pathlib import Path
 
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -17,12 +18,8 @@ LINK = re.compile(r"(!?\[[^\]]*\]\()([^)#\s]+)((?:#[^)]*)?\))")
 
 
 def place_of(path):
-    """Where a file of the repository is on the site; None where it is not."""
-    if path in PAGES:
-        return PAGES[path]
-    if path.startswith("docs/"):
-        return path.removeprefix("docs/")
-    return path if (ROOT / path).is_file() else None  # copied by on_files()
+    """Where a file of the repository is on the site; those beside docs/ are copied by on_files()."""
+    return PAGES.get(path, path.removeprefix("docs/"))
 
 
 def rewritten(text, source, target):
@@ -32,12 +29,11 @@ def rewritten(text, source, target):
         if ":" in address:
             return match[0]
         path = posixpath.normpath(posixpath.join(posixpath.dirname(source), address))
-        place = place_of(path)
-        if place is None or (ROOT / path).is_dir():  # a folder has no page
+        if path.startswith("..") or not (ROOT / path).exists():
+            raise PluginError(f"{source}: the link to '{address}' leads to nothing in the repository")
+        if (ROOT / path).is_dir() or path.endswith(".ipynb"):  # they have no page
             return re.sub(r"^!?\[|\]\($", "", before)
-        if target == "tutorials/python.md" and path.endswith(".ipynb"):
-            return re.sub(r"^!?\[|\]\($", "", before)
-        return before + posixpath.relpath(place, posixpath.dirname(target) or ".") + after
+        return before + posixpath.relpath(place_of(path), posixpath.dirname(target) or ".") + after
     return LINK.sub(link, text)
 
 

@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
-"""Tests of scripts/coverage_by_module and scripts/mutation: what they count, and which mutants they make."""
+"""Tests of scripts/coverage_by_module, scripts/mutation and scripts/site_hooks.py: what they count, which mutants they make, and
+which links they find to be broken."""
 import importlib.util
 import subprocess
 import sys
 import tempfile
+import types
 import unittest
+import unittest.mock
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 
@@ -17,6 +20,30 @@ def loaded(name):
     module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
     loader.exec_module(module)
     return module
+
+
+class SiteLinks(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        names = ("mkdocs", "mkdocs.exceptions", "mkdocs.structure", "mkdocs.structure.files")
+        modules = {name: types.ModuleType(name) for name in names}  # MkDocs need not be installed
+        modules["mkdocs.exceptions"].PluginError = ValueError
+        modules["mkdocs.structure.files"].File = None
+        with unittest.mock.patch.dict(sys.modules, modules):
+            cls.hooks = loaded("site_hooks.py")
+
+    def on_page(self, text):
+        return self.hooks.rewritten(text, "docs/tutorials/rover.md", "tutorials/rover.md")
+
+    def test_links_lead_to_where_files_are_on_the_site(self):
+        self.assertEqual(self.on_page("[a](../limits.md#x) [b](../../README.md)"), "[a](../limits.md#x) [b](../index.md)")
+        self.assertEqual(self.on_page("[c](../../tests/consumer/main.cpp)"), "[c](../tests/consumer/main.cpp)")
+        self.assertEqual(self.on_page("[folder](../../tests/consumer), [notebook](kitti.ipynb)"), "folder, notebook")
+
+    def test_a_link_that_leads_to_nothing_is_an_error(self):
+        for link in ("[a](../../tests/consumer/none.cpp)", "[b](none.md)", "[c](../../none)", "[d](../../../main)"):
+            with self.assertRaisesRegex(ValueError, "rover.md: the link to"):
+                self.on_page(link)
 
 
 class CoverageByModule(unittest.TestCase):
