@@ -183,6 +183,13 @@ Result<StreamRead> Recording::read(std::chrono::nanoseconds /*timeout*/) {
   return read;
 }
 
+Result<StereoFrame> Recording::frame_at(const std::string& pair, Stamp left_stamp) {
+  auto sample = sample_at(pair, left_stamp);
+  if (!sample) return failure(sample);
+  if (auto* frame = std::get_if<StereoFrame>(&*sample)) return std::move(*frame);
+  return failure(ErrorCode::input, std::get<MissingFrame>(*sample).message);
+}
+
 Result<StereoFrame> Recording::preview(const std::string& pair, std::size_t index) {
   const std::vector<Stamp> stamps = listed_stamps(pair);
   if (index < stamps.size()) return frame_at(pair, stamps[index]);

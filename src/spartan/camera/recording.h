@@ -68,9 +68,11 @@ class Recording : public SampleStream {
   /// stamps may run backwards. Codes: `input` where the recording holds fewer samples, and those of next().
   virtual Status seek(std::int64_t samples_taken) = 0;
 
-  /// Decodes one frame, independent of the read position. Code `input` where no frame has this left stamp.
-  /// Does not change content_hash().
-  virtual Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp) = 0;
+  /// Decodes one frame, independent of the read position: a StereoFrame, or a MissingFrame as next() delivers it. Code
+  /// `input` where no frame has this left stamp. Does not change content_hash().
+  virtual Result<Sample> sample_at(const std::string& pair, Stamp left_stamp) = 0;
+  /// The frame of sample_at(). Code `input` where it is missing, too.
+  Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp);
 
   /// Left stamps of all listed frames of a pair, in playback order.
   virtual std::vector<Stamp> listed_stamps(const std::string& pair) const = 0;

@@ -315,6 +315,19 @@ TEST_F(SpartanRecordingFaults, SeekContinuesLikeAnUninterruptedReader) {
   EXPECT_FALSE(open_recording(path_).value()->seek(static_cast<std::int64_t>(all.size()) + 1));
 }
 
+TEST_F(SpartanRecordingFaults, ASampleOnRequestHasTheImageThatIsThere) {
+  std::filesystem::remove(path_ + "/images/front/6000000000_right.png");
+  auto source = open_recording(path_).value();
+  const auto sample = source->sample_at("front", {6'000'000'000LL});
+  ASSERT_TRUE(sample) << sample.error().message();
+  const auto* const missing = std::get_if<MissingFrame>(&*sample);
+  ASSERT_NE(missing, nullptr);
+  EXPECT_EQ(missing->fault, FrameFault::right_missing);
+  ASSERT_TRUE(missing->partial);
+  EXPECT_FALSE(missing->partial->left.empty());
+  EXPECT_EQ(source->frame_at("front", {6'000'000'000LL}).error().code, ErrorCode::input);
+}
+
 TEST_F(SpartanRecordingFaults, FramesOnRequestByStamp) {
   auto source = open_recording(path_).value();
   EXPECT_EQ(source->listed_stamps("front").size(), 5u);

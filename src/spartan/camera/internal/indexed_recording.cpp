@@ -149,15 +149,12 @@ class IndexedRecording : public Recording {
     return {};
   }
 
-  Result<StereoFrame> frame_at(const std::string& pair, Stamp left_stamp) override {
+  Result<Sample> sample_at(const std::string& pair, Stamp left_stamp) override {
     for (const FrameEntry& entry : index_.frames) {
       if (entry.pair != pair || entry.left_stamp != left_stamp || entry.fault == FrameFault::stamp_reversed) continue;
       const auto files = read_files(entry, index_.video.get());
       if (!files) return failure(files);
-      auto sample = decode(entry, *files);
-      if (!sample) return failure(sample);
-      if (auto* frame = std::get_if<StereoFrame>(&*sample)) return std::move(*frame);
-      return failure(ErrorCode::input, std::get<MissingFrame>(*sample).message);
+      return decode(entry, *files);
     }
     return failure(ErrorCode::input,
                    fmt::format("has no frame of pair '{}' at {} s", pair, to_decimal_seconds(left_stamp)),
