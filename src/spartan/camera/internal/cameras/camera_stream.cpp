@@ -118,12 +118,15 @@ Status CameraStream::wait_for_previews() {
     const CameraDriver& driver = feed->sources.front()->request().driver();
     if (driver.trigger == CameraDriver::kSoftware && !(driver.rate_hz > 0)) static_cast<void>(trigger(feed->pair.name));
   }
+  std::map<std::string, Fault> faults;  // the last one of each pair
   std::unique_lock lock(mutex_);
   for (;;) {
     take_all(Clock::now());
     for (StreamRead& read : samples_) {
       auto* const frame = std::get_if<StereoFrame>(&*read.sample);
       if (frame != nullptr) previews_.try_emplace(frame->pair, *frame);
+      const auto* const fault = std::get_if<MissingFrame>(&*read.sample);
+      if (fault != nullptr) faults.insert_or_assign(fault->pair, Fault{fault->fault, fault->message, nullptr});
     }
     if (!waits()) samples_.clear();
     const auto lacks_preview = [&](const auto& feed) { return !previews_.contains(feed->pair.name); };
@@ -135,19 +138,26 @@ Status CameraStream::wait_for_previews() {
       missing = std::find_if(feeds_.begin(), feeds_.end(),
                              [&](const auto& feed) { return lacks_preview(feed) && feed->pair.for_odometry; });
       if (missing == feeds_.end()) return report_silent_pairs();
-      const auto& sources = (*missing)->sources;
-      const CameraReport left = sources.front()->camera_report(0),
-                         right = sources.back()->camera_report(sources.size() == 1 ? 1 : 0);
-      return failure(ErrorCode::read_error,
-                     fmt::format("pair {}: no frame within {:.0f} s ({} images by {}, {} by {})", (*missing)->pair.name,
-                                 std::chrono::duration<double>(options_.first_wait).count(), left.images,
-                                 (*missing)->pair.left, right.images, (*missing)->pair.right),
-                     info_.path,
-                     "check that the cameras run and take their images together; --pair-tolerance allows larger "
-                     "differences of their times");
+      const auto fault = faults.find((*missing)->pair.name);
+      return no_preview(**missing, fault == faults.end() ? nullptr : &fault->second);
     }
     changed_.wait_until(lock, std::min(next_timeout(until), Clock::now() + kAskToStop));
   }
+}
+
+tl::unexpected<Error> CameraStream::no_preview(const Feed& feed, const Fault* fault) const {
+  const CameraReport left = feed.sources.front()->camera_report(0),
+                     right = feed.sources.back()->camera_report(feed.sources.size() == 1 ? 1 : 0);
+  const bool has_wrong_size = fault != nullptr && fault->kind == FrameFault::wrong_size;
+  return failure(ErrorCode::read_error,
+                 fmt::format("pair {}: no frame within {:.0f} s ({} images by {}, {} by {}){}", feed.pair.name,
+                             std::chrono::duration<double>(options_.first_wait).count(), left.images, feed.pair.left,
+                             right.images, feed.pair.right, fault != nullptr ? ": " + fault->message : ""),
+                 info_.path,
+                 has_wrong_size ? "state the size of the images as size_px of the cameras in the rig, or let the "
+                                  "driver ask for that size"
+                                : "check that the cameras run and take their images together; --pair-tolerance allows "
+                                  "larger differences of their times");
 }
 
 Status CameraStream::report_silent_pairs() const {

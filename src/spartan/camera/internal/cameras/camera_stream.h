@@ -92,6 +92,8 @@ class CameraStream : public SampleStream, public CameraControl {
   std::string why_missing(const Feed& feed, std::size_t side) const;
   void push(Sample sample, std::chrono::steady_clock::time_point arrived);
   Status wait_for_previews();
+  /// `fault`: of the last frame that could not be delivered; null: there was none.
+  tl::unexpected<Error> no_preview(const Feed& feed, const Fault* fault) const;
   Status report_silent_pairs() const;
   bool all_ended() const;
   bool waits() const;

@@ -199,6 +199,16 @@ TEST_F(CameraStreamTest, WaitingForTheFirstFramesCanBeInterrupted) {
   EXPECT_EQ(stream.error().code, ErrorCode::interrupted);
 }
 
+TEST_F(CameraStreamTest, TheErrorWithoutAFirstFrameSaysWhyImagesWereNotTaken) {
+  left_script.add(image_read(1, 1, {4, 3}));
+  right_script.add(image_read(1, 1, {4, 3}));
+  const auto stream = open(two_cameras());
+  ASSERT_FALSE(stream);
+  EXPECT_EQ(stream.error().code, ErrorCode::read_error);
+  EXPECT_THAT(stream.error().what, HasSubstr("delivers images of 4 × 3, the rig has 8 × 6"));
+  EXPECT_THAT(stream.error().hint, HasSubstr("size_px"));
+}
+
 TEST_F(CameraStreamTest, PairsOfImagesBecomeFrames) {
   deliver(1);
   auto stream = open(two_cameras());
