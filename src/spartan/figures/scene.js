@@ -154,6 +154,8 @@
     scene.add(sun);
     const controls = new THREE.OrbitControls(camera, renderer.domElement);
     controls.screenSpacePanning = false;
+    controls.enableKeys = false;  // the element has the keys and the focus
+    renderer.domElement.tabIndex = -1;
     const marker = rover(), lines = {}, limits = {};
     scene.add(marker);
     let terrain = null, map = null, layer = 'colour', framed = false, mapFramed = false, following = false, asked = false, frames = null, now = 0;
@@ -220,15 +222,36 @@
     new ResizeObserver(resize).observe(element);
     controls.addEventListener('change', ask);
     element.addEventListener('pointerdown', () => element.focus());  // which OrbitControls prevents
-    element.addEventListener('keydown', event => {
-      const by = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
-      if (!by) return;
-      event.preventDefault();
-      const ahead = new THREE.Vector3().subVectors(controls.target, camera.position).setZ(0).normalize();
+    const move = (right, ahead) => {
+      const forward = new THREE.Vector3().subVectors(controls.target, camera.position).setZ(0).normalize();
       const step = camera.position.distanceTo(controls.target) / 12;
-      const move = new THREE.Vector3(ahead.y, -ahead.x, 0).multiplyScalar(by[0] * step).addScaledVector(ahead, by[1] * step);
-      camera.position.add(move);
-      controls.target.add(move);
+      const by = new THREE.Vector3(forward.y, -forward.x, 0).multiplyScalar(right * step).addScaledVector(forward, ahead * step);
+      camera.position.add(by);
+      controls.target.add(by);
+    };
+    // Around the target, which stays in the middle; `zoom`: factor of the distance.
+    const orbit = (right, up, zoom) => {
+      const kTurn_rad = Math.PI / 24, kLeast_rad = 0.01;  // from the vertical
+      const offset = new THREE.Vector3().subVectors(camera.position, controls.target).multiplyScalar(zoom);
+      const distance = offset.length(), azimuth = Math.atan2(offset.y, offset.x) + right * kTurn_rad;
+      const polar = Math.min(Math.max(Math.acos(offset.z / distance) - up * kTurn_rad, kLeast_rad), Math.PI - kLeast_rad);
+      const level = distance * Math.sin(polar);
+      offset.set(level * Math.cos(azimuth), level * Math.sin(azimuth), distance * Math.cos(polar));
+      camera.position.copy(controls.target).add(offset);
+    };
+    const kZoom = 1.2;
+    element.addEventListener('keydown', event => {
+      const arrow = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
+      const zoom = {'+': 1 / kZoom, '=': 1 / kZoom, '-': kZoom, '_': kZoom}[event.key];
+      if (event.ctrlKey || event.metaKey || event.altKey || (!arrow && !zoom)) return;  // such as the zoom of the browser
+      event.preventDefault();
+      if (zoom) {
+        orbit(0, 0, zoom);
+      } else if (event.shiftKey) {
+        orbit(...arrow, 1);
+      } else {
+        move(...arrow);
+      }
       controls.update();
       ask();
     });
@@ -395,7 +418,8 @@
         box.append(made);
       },
       state: () => ({drawn, vertices: terrain ? terrain.geometry.getAttribute('position').count : 0,
-        triangles: terrain ? terrain.geometry.index.count / 3 : 0, time: now, rover: marker.position.toArray(), lines: Object.keys(lines)}),
+        triangles: terrain ? terrain.geometry.index.count / 3 : 0, time: now, rover: marker.position.toArray(),
+        camera: camera.position.toArray(), target: controls.target.toArray(), lines: Object.keys(lines)}),
     };
     resize();
     return api;

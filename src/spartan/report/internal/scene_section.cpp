@@ -18,9 +18,9 @@ constexpr const char* kFigure = R"html(<figure class="solid">
 <div class="legend"><label>Colour <select id="colour-by">
 <option value="colour">image</option><option value="elevation_m">elevation</option><option value="class">class</option>
 <option value="cost">cost</option><option value="sigma_m">σ of elevation</option></select></label></div>
-<div id="scene" role="img" tabindex="0" aria-label="The terrain in 3D. Drag to turn, wheel or pinch to zoom, arrow keys to move."></div>
+<div id="scene" role="img" tabindex="0" aria-label="The terrain in 3D. Drag to turn, wheel or pinch to zoom, arrow keys to move, Shift and arrow keys to turn, + and − to zoom."></div>
 <div class="legend" id="scene-legend"></div>
-<figcaption>The global map and the trajectories; the rover is at its last position. Drag turns, wheel or pinch zooms.</figcaption>
+<figcaption>The global map and the trajectories; the rover is at its last position. Drag turns, wheel or pinch zooms; so do Shift with the arrow keys, and + and −.</figcaption>
 </figure>
 )html";
 
