@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -81,6 +82,8 @@ struct RunIdentity {
   std::string given_options{}, given_rig{};
   std::string given_keys{};  ///< of the options that the user gave: a default that was given is not completed
   std::optional<Eigen::Vector3d> ground_up{};  ///< by these images, body frame
+
+  bool operator==(const RunIdentity&) const = default;
 };
 
 /// Time that a run has taken, interrupted executions of the program included.
@@ -147,10 +150,13 @@ class RunStore {
   /// Tables of the global map.
   TileStore& tiles();
 
-  /// All records, in time order. Code `store_damaged`.
+  /// All records, or those from number `from` on, in time order. Code `store_damaged`.
   Result<std::vector<FrameRecord>> frames();
-  Result<std::vector<TerrainRecord>> terrain();
-  Result<std::vector<MapRecord>> maps();
+  Result<std::vector<TerrainRecord>> terrain(std::int64_t from = 0);
+  Result<std::vector<MapRecord>> maps(std::int64_t from = 0);
+  /// Calls `take` for each frame from number `from` on, in time order. Rows of frames before are not read. Code
+  /// `store_damaged`.
+  Status read_frames(std::int64_t from, const std::function<void(FrameRecord&&)>& take);
 
   Result<RowCounts> row_counts();
 

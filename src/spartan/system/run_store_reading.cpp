@@ -1,4 +1,6 @@
 // Reading the records of a run store.
+#include <fmt/format.h>
+
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -20,9 +22,11 @@ namespace {
 // are in the order of the frames, so each row is read once, for any number of frames.
 class RowsOfFrames {
  public:
-  static Result<RowsOfFrames> open(Database& db, const char* sql) {
+  /// `sql`: of the rows whose `seq` is above its parameter.
+  static Result<RowsOfFrames> open(Database& db, const std::string& sql, std::int64_t after) {
     auto select = db.prepare(sql);
     if (!select) return failure(select);
+    select->bind(1, after);
     RowsOfFrames rows(std::move(*select), db.path());
     if (Status s = rows.next(); !s) return failure(s);
     return rows;
@@ -118,45 +122,55 @@ bool add_innovation(const SqlStatement& row, FrameRecord& frame) {
 // What other tables contain about a frame: `add` reads a row, and returns false where it is damaged.
 struct FrameTable {
   const char* name;
-  const char* select;
+  const char* columns;
+  bool has_key;   ///< `seq` is its key: at most one row per frame
   bool optional;  ///< older versions of the program did not write it
   bool (*add)(const SqlStatement& row, FrameRecord& frame);
+
+  /// Of the rows after a frame. Without the key they are found from the end of the table, which reads only them.
+  std::string select() const {
+    if (has_key) return fmt::format("SELECT {} FROM {} WHERE seq > ?1 ORDER BY seq", columns, name);
+    return fmt::format(
+        "SELECT {0} FROM {1} WHERE rowid > coalesce((SELECT rowid FROM {1} WHERE ?1 > 0 AND seq <= ?1 "
+        "ORDER BY rowid DESC LIMIT 1), 0) ORDER BY rowid",
+        columns, name);
+  }
 };
 
 // Each after those that it builds on. Tables with several rows per frame are written in its transaction, so their rows
 // are in the order of the frames.
 constexpr FrameTable kFrameTables[] = {
-    {"stage_times", "SELECT seq, stage, wall_ms, cpu_ms FROM stage_times ORDER BY rowid", false,
+    {"stage_times", "seq, stage, wall_ms, cpu_ms", false, false,
      [](const SqlStatement& row, FrameRecord& frame) {
        frame.times.push_back({row.text(1), row.real(2), row.real(3)});
        return true;
      }},
-    {"latencies", "SELECT seq, wall_ms FROM latencies ORDER BY seq", true,
+    {"latencies", "seq, wall_ms", true, true,
      [](const SqlStatement& row, FrameRecord& frame) {
        frame.latency_ms = row.real(1);
        return std::isfinite(*frame.latency_ms) && *frame.latency_ms >= 0;
      }},
-    {"slam", "SELECT * FROM slam ORDER BY seq", false,
+    {"slam", "*", true, false,
      [](const SqlStatement& row, FrameRecord& frame) {
        frame.slam = uncertain_pose_of(row, 1);
        return frame.slam.has_value();
      }},
-    {"smoothed", "SELECT * FROM smoothed ORDER BY seq", true,
+    {"smoothed", "*", true, true,
      [](const SqlStatement& row, FrameRecord& frame) {
        frame.smoothed = uncertain_pose_of(row, 1);
        return frame.smoothed.has_value();
      }},
-    {"localization", "SELECT * FROM localization ORDER BY seq", false,
+    {"localization", "*", true, false,
      [](const SqlStatement& row, FrameRecord& frame) {
        frame.localization = localization_of(row);
        return frame.localization.has_value();
      }},
-    {"health", "SELECT seq, sensor, state, reason FROM health ORDER BY rowid", false,
+    {"health", "seq, sensor, state, reason", false, false,
      [](const SqlStatement& row, FrameRecord& frame) {
        if (frame.localization) frame.localization->sensors.push_back({row.text(1), row.text(2), row.text(3)});
        return is_sensor_state(row.text(2));
      }},
-    {"innovations", "SELECT seq, sensor, stamp_ns, nis, gate FROM innovations ORDER BY rowid", true, add_innovation},
+    {"innovations", "seq, sensor, stamp_ns, nis, gate", false, true, add_innovation},
 };
 
 // None if a pose or a covariance is incomplete, a pose is not finite, or a stamp is out of range.
@@ -248,58 +262,64 @@ TileStore& RunStore::tiles() {
 }
 
 Result<std::vector<FrameRecord>> RunStore::frames() {
+  std::vector<FrameRecord> records;
+  const Status status = read_frames(0, [&](FrameRecord&& record) { records.push_back(std::move(record)); });
+  if (!status) return failure(status);
+  return records;
+}
+
+Status RunStore::read_frames(std::int64_t from, const std::function<void(FrameRecord&&)>& take) {
   Database& db = state_->db;
-  auto select = db.prepare("SELECT * FROM frames ORDER BY seq");
+  auto select = db.prepare("SELECT * FROM frames WHERE seq > ?1 ORDER BY seq");
   if (!select) return failure(select);
+  select->bind(1, from);
   std::vector<std::pair<const FrameTable*, RowsOfFrames>> tables;
   for (const FrameTable& table : kFrameTables) {
     const auto there = table.optional ? has_table(db, table.name) : true;
     if (!there) return failure(there);
     if (!*there) continue;
-    auto rows = RowsOfFrames::open(db, table.select);
+    auto rows = RowsOfFrames::open(db, table.select(), from);
     if (!rows) return failure(rows);
     tables.emplace_back(&table, std::move(*rows));
   }
-  std::vector<FrameRecord> records;
   for (;;) {
     const auto row = select->step();
     if (!row) return failure(row);
-    if (!*row) return records;
-    auto frame = frame_of(*select);
-    if (!frame) return damaged_table(db, "frames", kNoPose);
-    FrameRecord& record = records.emplace_back(std::move(*frame));
+    if (!*row) return {};
+    auto record = frame_of(*select);
+    if (!record) return damaged_table(db, "frames", kNoPose);
     for (auto& [table, rows] : tables) {
       bool whole = true;
-      const Status read =
-          rows.of(select->integer(0), [&](const SqlStatement& detail) { whole = table->add(detail, record) && whole; });
+      const Status read = rows.of(select->integer(0),
+                                  [&](const SqlStatement& detail) { whole = table->add(detail, *record) && whole; });
       if (!read) return failure(read);
       if (!whole) return damaged_table(db, table->name, kDamagedRow);
     }
+    take(std::move(*record));
   }
 }
 
-Result<std::vector<TerrainRecord>> RunStore::terrain() {
+Result<std::vector<TerrainRecord>> RunStore::terrain(std::int64_t from) {
   std::vector<TerrainRecord> records;
-  const Status status =
-      for_each_row(state_->db, "SELECT * FROM terrain ORDER BY stamp_ns", [&](const SqlStatement& row) {
-        records.push_back({Stamp{row.integer(0)}, row.text(1), row.real(2), row.integer(3)});
-        return Status();
-      });
+  const std::string sql = fmt::format("SELECT * FROM terrain ORDER BY stamp_ns LIMIT -1 OFFSET {}", from);
+  const Status status = for_each_row(state_->db, sql, [&](const SqlStatement& row) {
+    records.push_back({Stamp{row.integer(0)}, row.text(1), row.real(2), row.integer(3)});
+    return Status();
+  });
   if (!status) return failure(status);
   return records;
 }
 
-Result<std::vector<MapRecord>> RunStore::maps() {
+Result<std::vector<MapRecord>> RunStore::maps(std::int64_t from) {
   std::vector<MapRecord> records;
-  const Status status =
-      for_each_row(state_->db, "SELECT * FROM maps ORDER BY stamp_ns", [&](const SqlStatement& row) -> Status {
-        const auto prior = uncertain_pose_of(row, 7), corrected = uncertain_pose_of(row, 3);
-        if (!prior || !corrected) return damaged_table(state_->db, "maps", kNoPose);
-        records.push_back({Stamp{row.integer(0)}, row.integer(1), static_cast<int>(row.integer(2)), *prior, *corrected,
-                           row.text(9), row.real(10), static_cast<int>(row.integer(5)),
-                           static_cast<int>(row.integer(6))});
-        return {};
-      });
+  const std::string sql = fmt::format("SELECT * FROM maps ORDER BY stamp_ns LIMIT -1 OFFSET {}", from);
+  const Status status = for_each_row(state_->db, sql, [&](const SqlStatement& row) -> Status {
+    const auto prior = uncertain_pose_of(row, 7), corrected = uncertain_pose_of(row, 3);
+    if (!prior || !corrected) return damaged_table(state_->db, "maps", kNoPose);
+    records.push_back({Stamp{row.integer(0)}, row.integer(1), static_cast<int>(row.integer(2)), *prior, *corrected,
+                       row.text(9), row.real(10), static_cast<int>(row.integer(5)), static_cast<int>(row.integer(6))});
+    return {};
+  });
   if (!status) return failure(status);
   return records;
 }

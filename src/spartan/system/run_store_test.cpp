@@ -159,6 +159,39 @@ TEST(RunStore, ReadsCommittedRecordsBitForBit) {
 }
 
 // Older programs have not stored it.
+TEST(RunStore, ReadsRecordsFromANumberOn) {
+  const testing::TemporaryFolder folder;
+  auto store = RunStore::create(folder.path() + "/run.sqlite", kIdentity);
+  ASSERT_TRUE(store) << store.error().message();
+  for (int i = 0; i < 6; ++i) {
+    const TerrainRecord terrain{some_frame(i).stamp, "narrow", 91.5, 1234};
+    ASSERT_TRUE(commit(*store, {some_frame(i), terrain, some_map(i), {}}));
+  }
+  const auto all = store->frames();
+  ASSERT_TRUE(all);
+  for (const int from : {0, 1, 3, 5, 6, 9}) {
+    std::vector<FrameRecord> frames;
+    ASSERT_TRUE(store->read_frames(from, [&](FrameRecord&& frame) { frames.push_back(std::move(frame)); }));
+    const std::size_t expected = from < 6 ? static_cast<std::size_t>(6 - from) : 0;
+    ASSERT_EQ(frames.size(), expected) << from;
+    ASSERT_EQ(store->terrain(from)->size(), expected) << from;
+    ASSERT_EQ(store->maps(from)->size(), expected) << from;
+    for (std::size_t i = 0; i < expected; ++i) {
+      const FrameRecord &read = frames[i], &whole = (*all)[static_cast<std::size_t>(from) + i];
+      EXPECT_EQ(read.stamp, whole.stamp);
+      EXPECT_EQ(read.times.size(), whole.times.size());
+      EXPECT_EQ(read.latency_ms, whole.latency_ms);
+      ASSERT_EQ(read.localization.has_value(), whole.localization.has_value());
+      if (!read.localization) continue;
+      ASSERT_EQ(read.localization->sensors.size(), 2U);
+      EXPECT_EQ(read.localization->sensors[1].reason, whole.localization->sensors[1].reason);
+      EXPECT_EQ(read.localization->sensors[0].test.has_value(), whole.localization->sensors[0].test.has_value());
+      EXPECT_EQ((*store->terrain(from))[i].stamp, read.stamp);
+      EXPECT_EQ((*store->maps(from))[i].stamp, read.stamp);
+    }
+  }
+}
+
 TEST(RunStore, IsResumedWithoutTheElapsedTime) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.path() + "/run.sqlite";
