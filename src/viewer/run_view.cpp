@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
+#include <variant>
 
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
@@ -50,6 +53,11 @@ std::string input_of(const RunFolder& folder) {
   return fs::exists(input, error) ? input : "";
 }
 
+// Number of the last one of so many; 0 where there is none.
+std::int64_t last_of(std::size_t count) {
+  return count == 0 ? 0 : static_cast<std::int64_t>(count) - 1;
+}
+
 tl::unexpected<Error> no_such(const char* what, std::size_t number, const std::string& path) {
   return failure(ErrorCode::input, fmt::format("has no {} {}", what, number), path);
 }
@@ -57,36 +65,77 @@ tl::unexpected<Error> no_such(const char* what, std::size_t number, const std::s
 }  // namespace
 
 Result<std::unique_ptr<RunView>> RunView::open(const ViewRequest& request) {
-  const RunFolder folder{request.run};
-  const auto rig = read_rig_yaml(folder.rig());
-  if (!rig) return failure(rig);
-  auto options = load_options<RunOptions>(folder.config());
-  if (!options) return failure(options);
-  std::unique_ptr<RunView> view(new RunView(request, folder, *rig, *options));
+  std::unique_ptr<RunView> view(new RunView(request));
+  if (Status s = view->read_settings(); !s) return failure(s);
   if (Status s = view->refresh(); !s) return failure(s);
   return view;
+}
+
+Status RunView::read_settings() {
+  auto rig = read_rig_yaml(folder_.rig());
+  if (!rig) return failure(rig);
+  auto options = load_options<RunOptions>(folder_.config());
+  if (!options) return failure(options);
+  rig_ = std::move(*rig);
+  options_ = std::move(*options);
+  imager_.reset();
+  recordings_.clear();
+  recordings_are_complete_ = false;
+  return {};
 }
 
 Status RunView::refresh() {
   const std::string version = version_of(folder_.store());
   if (version == version_) return {};
+  auto identity = RunStore::identity_of(folder_.store());
+  if (!identity) return failure(identity);
   auto store = RunStore::open_read_only(folder_.store());
   if (!store) return failure(store);
-  auto frames = store->frames();
-  if (!frames) return failure(frames);
-  auto terrain = store->terrain();
-  if (!terrain) return failure(terrain);
-  auto maps = store->maps();
-  if (!maps) return failure(maps);
+  const bool is_other_run = identity_ && *identity != identity_;
+  if (is_other_run) {
+    if (Status s = read_settings(); !s) return s;
+  }
+  auto is_continued = is_other_run ? Result<bool>(false) : read_added(*store);
+  if (!is_continued) return failure(is_continued);
+  if (!*is_continued) {
+    ++generation_;
+    frames_.clear();
+    terrain_.clear();
+    maps_ = 0;
+    is_continued = read_added(*store);
+    if (!is_continued) return failure(is_continued);
+  }
   const auto tiles = store->tiles().index();
   if (!tiles) return failure(tiles);
   map_version_ = 0;
   for (const auto& tile : *tiles) map_version_ = std::max(map_version_, tile.revision);
-  frames_ = std::move(*frames);
-  terrain_ = std::move(*terrain);
-  maps_ = std::move(*maps);
+  identity_ = std::move(*identity);
   version_ = version;
   return {};
+}
+
+// The last record of each kind is read again: false where it is another one, so that the run has gone back to a
+// checkpoint. Then nothing is changed.
+Result<bool> RunView::read_added(RunStore& store) {
+  std::vector<Frame> frames;
+  const Status read = store.read_frames(last_of(frames_.size()), [&](const FrameRecord& frame) {
+    const bool has_motion = frame.status != "missing" && frame.status != name_of(TrackingStatus::lost);
+    frames.push_back({frame.pair, frame.stamp, frame.motion.from, has_motion && !frame.motion.first});
+  });
+  if (!read) return failure(read);
+  const auto terrain = store.terrain(last_of(terrain_.size()));
+  if (!terrain) return failure(terrain);
+  const auto maps = store.maps(last_of(static_cast<std::size_t>(maps_)));
+  if (!maps) return failure(maps);
+  if (!frames_.empty() && (frames.empty() || frames.front().stamp != frames_.back().stamp)) return false;
+  if (!terrain_.empty() && (terrain->empty() || terrain->front().stamp != terrain_.back())) return false;
+  if (maps_ > 0 && maps->empty()) return false;
+  if (!frames_.empty()) frames_.pop_back();
+  std::move(frames.begin(), frames.end(), std::back_inserter(frames_));
+  if (!terrain_.empty()) terrain_.pop_back();
+  for (const TerrainRecord& view : *terrain) terrain_.push_back(view.stamp);
+  maps_ = last_of(static_cast<std::size_t>(maps_)) + static_cast<std::int64_t>(maps->size());
+  return true;
 }
 
 // Where a run was resumed the store has more frames than the summary, which is of its first part; where it is just
@@ -107,27 +156,35 @@ Result<std::string> RunView::overview() {
   if (Status s = refresh(); !s) return failure(s);
   const bool ended = has_ended();
   Json terrain = Json::array();
-  for (const TerrainRecord& view : terrain_) {
-    const auto frame = std::lower_bound(frames_.begin(), frames_.end(), view.stamp,
-                                        [](const FrameRecord& f, const Stamp& stamp) { return f.stamp < stamp; });
-    const bool found = frame != frames_.end() && frame->stamp == view.stamp;
+  for (const Stamp view : terrain_) {
+    const auto frame = std::lower_bound(frames_.begin(), frames_.end(), view,
+                                        [](const Frame& f, const Stamp& stamp) { return f.stamp < stamp; });
+    const bool found = frame != frames_.end() && frame->stamp == view;
     terrain.push_back(found ? frame - frames_.begin() : -1);
   }
   return Json{{"name", fs::path(folder_.path).lexically_normal().filename().string()},
               {"rig", rig_.name},
               {"frames", frames_.size()},
               {"terrain", terrain},
-              {"maps", maps_.size()},
+              {"maps", maps_},
               {"map_version", map_version_},
-              {"has_images", !recording_folders().empty()},
-              {"ended", ended}}
+              {"has_images", !image_sources().empty()},
+              {"ended", ended},
+              {"generation", generation_}}
       .dump();
 }
 
 Result<std::string> RunView::frames(std::size_t from) {
   const std::lock_guard lock(mutex_);
   if (Status s = refresh(); !s) return failure(s);
-  return frame_columns(frames_, std::min(from, frames_.size()));
+  auto store = RunStore::open_read_only(folder_.store());
+  if (!store) return failure(store);
+  from = std::min(from, frames_.size());
+  FrameColumns columns(from, frames_.empty() ? Stamp() : frames_.front().stamp);
+  const Status read =
+      store->read_frames(static_cast<std::int64_t>(from), [&](const FrameRecord& frame) { columns.add(frame); });
+  if (!read) return failure(read);
+  return columns.json();
 }
 
 Result<std::string> RunView::map() {
@@ -138,70 +195,112 @@ Result<std::string> RunView::map() {
 }
 
 // The one that was named, else those that a live run has recorded, else that of the summary.
-std::vector<std::string> RunView::recording_folders() const {
-  if (!request_.recording.empty()) return {request_.recording};
-  std::vector<std::string> folders;
+std::vector<RunView::ImageSource> RunView::image_sources() const {
+  OpenOptions open = request_.open;
+  open.unfinished = true;  // the last one of a live run
+  if (!request_.recording.empty()) return {{request_.recording, open}};
+  OpenOptions open_own;
+  open_own.unfinished = true;
+  open_own.pair_tolerance_s = std::numeric_limits<double>::infinity();  // the stream has paired its images
+  std::vector<ImageSource> sources;
   std::error_code error;
   for (int number = 1; fs::exists(folder_.recording(number), error); ++number)
-    folders.push_back(folder_.recording(number));
-  if (const std::string input = input_of(folder_); folders.empty() && !input.empty()) folders.push_back(input);
-  return folders;
+    sources.push_back({folder_.recording(number), open_own, true});
+  if (const std::string input = input_of(folder_); sources.empty() && !input.empty()) sources.push_back({input, open});
+  return sources;
 }
 
 Status RunView::open_recordings() {
-  const std::vector<std::string> folders = recording_folders();
-  if (folders.empty())
-    return failure(ErrorCode::input, "does not state its recording", folder_.path, "name it by --recording");
-  request_.open.unfinished = true;  // the last one of a live run
-  recordings_are_complete_ = has_ended();
-  recordings_.clear();
-  for (const std::string& folder : folders) {
-    auto opened = open_recording(folder, request_.open);
-    if (!opened) return failure(opened);
-    recordings_.push_back(std::move(*opened));
+  if (!imager_) {
+    auto imager = Imager::create(rig_, options_.imaging, ThreadPool(1), folder_.path);
+    if (!imager) return failure(imager);
+    imager_ = std::move(*imager);
   }
-  if (imager_) return {};
-  auto imager = Imager::create(rig_, options_.imaging, ThreadPool(1), folder_.path);
-  if (!imager) return failure(imager);
-  imager_ = std::move(*imager);
+  const std::vector<ImageSource> sources = image_sources();
+  if (sources.empty())
+    return failure(ErrorCode::input, "does not state its recording", folder_.path, "name it by --recording");
+  const bool are_complete = has_ended();
+  std::vector<std::unique_ptr<Recording>> recordings;
+  for (const ImageSource& source : sources) {
+    auto opened = open_recording(source.folder, source.open);
+    // Such as one that was interrupted before it listed a frame.
+    if (!opened && source.is_own && opened.error().code == ErrorCode::input) continue;
+    if (!opened) return failure(opened);
+    recordings.push_back(std::move(*opened));
+  }
+  recordings_ = std::move(recordings);
+  recordings_are_complete_ = are_complete;
   return {};
 }
 
-// A recording that is being made has more frames than when it was opened.
-Result<StereoFrame> RunView::frame_at(std::size_t frame) {
+Result<StereoFrame> RunView::find_images(const Frame& frame) const {
+  Result<Sample> found = failure(ErrorCode::input, "is not recorded", folder_.path);
+  for (auto recording = recordings_.rbegin(); recording != recordings_.rend() && !found; ++recording)
+    found = (*recording)->sample_at(frame.pair, frame.stamp);
+  if (!found) return failure(found);
+  if (auto* whole = std::get_if<StereoFrame>(&*found)) return std::move(*whole);
+  auto& missing = std::get<MissingFrame>(*found);
+  if (missing.partial) return std::move(*missing.partial);
+  return failure(ErrorCode::input, missing.message);
+}
+
+// One image alone where the other one is missing. A recording that is being made has more frames than when it was
+// opened.
+Result<StereoFrame> RunView::images_of(std::size_t frame) {
   if (frame >= frames_.size()) return no_such("frame", frame, folder_.path);
-  const FrameRecord& record = frames_[frame];
-  const auto find = [&]() -> Result<StereoFrame> {
-    Result<StereoFrame> found = no_such("image of frame", frame, folder_.path);
-    for (auto recording = recordings_.rbegin(); recording != recordings_.rend() && !found; ++recording)
-      found = (*recording)->frame_at(record.pair, record.stamp);
-    return found;
-  };
-  auto found = find();
+  auto found = find_images(frames_[frame]);
   if (found || recordings_are_complete_) return found;
   if (Status s = open_recordings(); !s) return failure(s);
-  return find();
+  return find_images(frames_[frame]);
+}
+
+// The frame at which the motion to a frame begins; none where no motion was measured.
+std::optional<std::size_t> RunView::reference_of(std::size_t frame) const {
+  const Frame& current = frames_[frame];
+  for (std::size_t before = current.has_motion ? frame : 0; before-- > 0;) {
+    if (frames_[before].stamp == current.motion_from && frames_[before].pair == current.pair) return before;
+  }
+  return std::nullopt;
+}
+
+// From the newest one: a frame, that at which the motion to it begins, and, where that has one image alone and thus no
+// depths of its own, those whose landmarks it has kept. Empty where no motion was measured.
+Result<std::vector<StereoFrame>> RunView::images_of_motion(std::size_t frame) {
+  constexpr std::size_t kMost = 10;
+  std::vector<StereoFrame> all;
+  std::optional<std::size_t> number = reference_of(frame) ? std::optional(frame) : std::nullopt;
+  while (number && all.size() < kMost) {
+    auto images = images_of(*number);
+    if (!images) return failure(images);
+    const bool has_depths = !images->left.empty() && !images->right.empty();
+    all.push_back(std::move(*images));
+    if (has_depths && all.size() > 1) break;
+    number = reference_of(*number);
+  }
+  return all;
 }
 
 Result<std::string> RunView::image(std::size_t frame) {
   const std::lock_guard lock(mutex_);
-  const auto read = frame_at(frame);
-  if (!read && frame < frames_.size() && !recordings_are_complete_) return std::string();  // not on disk yet
+  const auto read = images_of(frame);
+  const bool may_follow = frame < frames_.size() && !recordings_are_complete_ && !has_ended();
+  if (!read && may_follow) return std::string();  // not on disk yet
   if (!read) return failure(read);
+  if (read->left.empty()) return no_such("left image of frame", frame, folder_.path);
   const auto pair = imager_->process(*read);
   if (!pair) return failure(pair);
-  if (pair->left.empty()) return no_such("left image of frame", frame, folder_.path);
   return encode_jpeg(pair->left, kJpegQuality);
 }
 
 Result<std::string> RunView::landmarks(std::size_t frame) {
   const std::lock_guard lock(mutex_);
+  if (frame >= frames_.size()) return no_such("frame", frame, folder_.path);
   auto odometer = Odometer::create(options_.odometry, ThreadPool(1));
   if (!odometer) return failure(odometer);
-  for (std::size_t number = frame == 0 ? 0 : frame - 1; number <= frame; ++number) {
-    const auto read = frame_at(number);
-    if (!read) return failure(read);
-    const auto pair = imager_->process(*read);
+  const auto images = images_of_motion(frame);
+  if (!images) return failure(images);
+  for (auto image = images->rbegin(); image != images->rend(); ++image) {
+    const auto pair = imager_->process(*image);
     if (!pair) return failure(pair);
     odometer->add(*pair);
   }
@@ -217,7 +316,7 @@ Result<std::string> RunView::landmarks(std::size_t frame) {
 Result<std::string> RunView::disparity(std::size_t view) {
   const std::lock_guard lock(mutex_);
   if (view >= terrain_.size()) return no_such("terrain view", view, folder_.path);
-  return read_file(fmt::format("{}/{}.png", folder_.terrain(), terrain_[view].stamp.ns));
+  return read_file(fmt::format("{}/{}.png", folder_.terrain(), terrain_[view].ns));
 }
 
 }  // namespace spartan::viewer

@@ -25,29 +25,46 @@ class RunView {
   static Result<std::unique_ptr<RunView>> open(const ViewRequest& request);
 
   /// JSON: name, numbers of frames, terrain views and local maps, the version of the global map (0: there is none),
-  /// whether the run has ended.
+  /// whether the run has ended, and a number that changes where frames that were given before are others now.
   Result<std::string> overview();
-  /// frame_columns().
+  /// JSON of FrameColumns, from this number on.
   Result<std::string> frames(std::size_t from);
   /// map_layers(). Code `input`: there is no map.
   Result<std::string> map();
   /// The rectified left image of a frame as JPEG; empty where a live run has not recorded it yet. Code `input`: there
-  /// is no recording, or not this frame.
+  /// is no recording, or not this image.
   Result<std::string> image(std::size_t frame);
-  /// JSON: the landmarks by which the motion to this frame was measured, in the rectified left image. They are searched
-  /// anew, from this frame and the one before.
+  /// JSON: the landmarks by which the motion to this frame was measured, in the rectified left image; none where it was
+  /// not measured. They are searched anew, from images_of_motion().
   Result<std::string> landmarks(std::size_t frame);
   /// The disparity image of a terrain view, in colour, as PNG.
   Result<std::string> disparity(std::size_t view);
 
  private:
-  RunView(const ViewRequest& request, RunFolder folder, Rig rig, RunOptions options)
-      : request_(request), folder_(std::move(folder)), rig_(std::move(rig)), options_(std::move(options)) {}
+  // What is kept of a frame; the other columns are read when they are asked for.
+  struct Frame {
+    std::string pair;
+    Stamp stamp, motion_from;
+    bool has_motion = false;
+  };
+  // What is asked for an image.
+  struct ImageSource {
+    std::string folder;
+    OpenOptions open;
+    bool is_own = false;  // the run has recorded it
+  };
+
+  explicit RunView(const ViewRequest& request) : request_(request), folder_{request.run} {}
   Status refresh();
+  Status read_settings();
+  Result<bool> read_added(RunStore& store);
   bool has_ended() const;
-  std::vector<std::string> recording_folders() const;
+  std::vector<ImageSource> image_sources() const;
   Status open_recordings();
-  Result<StereoFrame> frame_at(std::size_t frame);
+  Result<StereoFrame> find_images(const Frame& frame) const;
+  Result<StereoFrame> images_of(std::size_t frame);
+  std::optional<std::size_t> reference_of(std::size_t frame) const;
+  Result<std::vector<StereoFrame>> images_of_motion(std::size_t frame);
 
   ViewRequest request_;
   RunFolder folder_;
@@ -55,10 +72,12 @@ class RunView {
   RunOptions options_;
   std::mutex mutex_;
   std::string version_;  // of the store's files
-  std::vector<FrameRecord> frames_;
-  std::vector<TerrainRecord> terrain_;
-  std::vector<MapRecord> maps_;
+  std::optional<RunIdentity> identity_;
+  std::vector<Frame> frames_;
+  std::vector<Stamp> terrain_;
+  std::int64_t maps_ = 0;
   std::int64_t map_version_ = 0;
+  std::int64_t generation_ = 0;                         // how often other records have replaced those that were read
   std::vector<std::unique_ptr<Recording>> recordings_;  // a live run that was resumed has several
   bool recordings_are_complete_ = false;                // opened after the run had ended
   std::optional<Imager> imager_;

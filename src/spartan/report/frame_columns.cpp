@@ -68,45 +68,62 @@ void fill_up(Json& table, std::size_t frames) {
 
 }  // namespace
 
-std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t from) {
-  Json columns{{"from", from},
-               {"total", frames.size()},
-               {"stages", Json::object()},
-               {"sensors", Json::object()},
-               {"innovations", Json::object()}};
+struct FrameColumns::State {
+  Json columns;
+  Stamp start;
+  std::size_t frames = 0;  // that were added
+
+  void add_localization(const LocalizationRecord& localization);
+};
+
+void FrameColumns::State::add_localization(const LocalizationRecord& localization) {
+  constexpr double kMost = 1e6;  // the quotient of a singular covariance has no meaning
+  for (const LocalizationRecord::Sensor& sensor : localization.sensors) {
+    add_named(columns["sensors"], sensor.name, sensor.state, frames);
+    if (!sensor.test) continue;
+    const double quotient = std::min(sensor.test->nis / sensor.test->gate, kMost);
+    add_named(columns["innovations"], sensor.name, rounded(quotient, 1e-4), frames);
+  }
+}
+
+FrameColumns::FrameColumns(std::size_t from, Stamp start) : state_(std::make_unique<State>()) {
+  state_->start = start;
+  state_->columns = {
+      {"from", from}, {"stages", Json::object()}, {"sensors", Json::object()}, {"innovations", Json::object()}};
   for (const char* name : {"t_s", "stamp_ns", "status", "message", "inliers", "matches", "landmarks", "rms_px", "pose",
                            "sigma_m", "ellipse_m2", "latency_ms", "odometry", "slam", "localization", "smoothed"})
-    columns[name] = Json::array();
-  for (std::size_t i = from; i < frames.size(); ++i) {
-    const FrameRecord& frame = frames[i];
-    columns["t_s"].push_back(rounded(seconds_between(frames.front().stamp, frame.stamp), 1e-3));
-    columns["stamp_ns"].push_back(std::to_string(frame.stamp.ns));
-    columns["status"].push_back(frame.status);
-    columns["message"].push_back(frame.message);
-    columns["inliers"].push_back(frame.motion.inliers);
-    columns["matches"].push_back(frame.motion.matches);
-    columns["landmarks"].push_back(frame.motion.landmarks);
-    columns["rms_px"].push_back(rounded(frame.motion.rms_px, 1e-3));
-    columns["latency_ms"].push_back(frame.latency_ms ? Json(rounded(*frame.latency_ms, 1e-3)) : Json(nullptr));
-    add_best(frame, columns);
-    for (const TrajectoryKind kind : kTrajectories)
-      columns[std::string(name_of(kind))].push_back(position(pose_of(frame, kind)));
-    for (const StageTime& time : frame.times) {
-      const bool is_part = time.stage.find('.') != std::string::npos;
-      if (!is_part) add_named(columns["stages"], time.stage, rounded(time.wall_ms, 1e-3), i - from);
-    }
-    if (!frame.localization) continue;
-    for (const LocalizationRecord::Sensor& sensor : frame.localization->sensors) {
-      add_named(columns["sensors"], sensor.name, sensor.state, i - from);
-      if (!sensor.test) continue;
-      constexpr double kMost = 1e6;  // the quotient of a singular covariance has no meaning
-      const double quotient = std::min(sensor.test->nis / sensor.test->gate, kMost);
-      add_named(columns["innovations"], sensor.name, rounded(quotient, 1e-4), i - from);
-    }
+    state_->columns[name] = Json::array();
+}
+FrameColumns::FrameColumns(FrameColumns&&) noexcept = default;
+FrameColumns& FrameColumns::operator=(FrameColumns&&) noexcept = default;
+FrameColumns::~FrameColumns() = default;
+
+void FrameColumns::add(const FrameRecord& frame) {
+  Json& columns = state_->columns;
+  columns["t_s"].push_back(rounded(seconds_between(state_->start, frame.stamp), 1e-3));
+  columns["stamp_ns"].push_back(std::to_string(frame.stamp.ns));
+  columns["status"].push_back(frame.status);
+  columns["message"].push_back(frame.message);
+  columns["inliers"].push_back(frame.motion.inliers);
+  columns["matches"].push_back(frame.motion.matches);
+  columns["landmarks"].push_back(frame.motion.landmarks);
+  columns["rms_px"].push_back(rounded(frame.motion.rms_px, 1e-3));
+  columns["latency_ms"].push_back(frame.latency_ms ? Json(rounded(*frame.latency_ms, 1e-3)) : Json(nullptr));
+  add_best(frame, columns);
+  for (const TrajectoryKind kind : kTrajectories)
+    columns[std::string(name_of(kind))].push_back(position(pose_of(frame, kind)));
+  for (const StageTime& time : frame.times) {
+    const bool is_part = time.stage.find('.') != std::string::npos;
+    if (!is_part) add_named(columns["stages"], time.stage, rounded(time.wall_ms, 1e-3), state_->frames);
   }
-  fill_up(columns["stages"], frames.size() - from);
-  fill_up(columns["sensors"], frames.size() - from);
-  fill_up(columns["innovations"], frames.size() - from);
+  if (frame.localization) state_->add_localization(*frame.localization);
+  ++state_->frames;
+}
+
+std::string FrameColumns::json() {
+  Json& columns = state_->columns;
+  columns["total"] = columns["from"].get<std::size_t>() + state_->frames;
+  for (const char* table : {"stages", "sensors", "innovations"}) fill_up(columns[table], state_->frames);
   return columns.dump();
 }
 

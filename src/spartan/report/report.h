@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "spartan/core/image.h"
 #include "spartan/core/result.h"
 #include "spartan/core/threads.h"
+#include "spartan/core/time.h"
 #include "spartan/core/trajectory.h"
 #include "spartan/rig_design/rig_designer.h"
 #include "spartan/system/map_files.h"
@@ -38,14 +40,30 @@ struct ReportRequest {
 /// as those who read run and recording.
 Result<std::string> make_report(ReportRequest request);
 
-/// The records of frames as columns of JSON, for plots: an object with an array for each quantity, of the frames from
-/// number `from` on; null where it is not known:
+/// The records of frames as columns of JSON, for plots: an object with an array for each quantity, null where it is not
+/// known, of the frames from number `from` on, and `total`, the number of the frame behind the last one:
 ///   t_s since the first frame, stamp_ns (text), status, message; inliers, matches, landmarks, rms_px; latency_ms;
 ///   pose [x, y, z, qx, qy, qz, qw] of the best trajectory, sigma_m (along x, y, z of the world), ellipse_m2
 ///   (covariance xx, xy, yy of the position); odometry, slam, localization, smoothed: [x, y, z]; stages: {name: [ms]};
 ///   sensors: {name: [state]}; innovations: {name: [normalized innovation squared over its gate]}: above 1 the
 ///   measurement contradicts its prediction.
-std::string frame_columns(const std::vector<FrameRecord>& frames, std::size_t from);
+class FrameColumns {
+ public:
+  /// Of a run that began at `start`.
+  FrameColumns(std::size_t from, Stamp start);
+  FrameColumns(FrameColumns&&) noexcept;
+  FrameColumns& operator=(FrameColumns&&) noexcept;
+  ~FrameColumns();
+
+  /// The next frame.
+  void add(const FrameRecord& frame);
+  /// After the last frame.
+  std::string json();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// The global map as a few arrays, for drawing in a browser: a JSON header with the layers and their places, padded to
 /// a multiple of four bytes, behind its length (4 bytes, little endian); then the layers `elevation_m`, `sigma_m`,

@@ -124,14 +124,15 @@
     nextMap = performance.now() + 9 * (performance.now() - asked);
     paint();
   };
-  // When a run ends, its smoothed trajectory changes frames that are here already: all are asked for again.
+  // When a run ends, its smoothed trajectory changes frames that are here already, as does a run that was resumed from a
+  // checkpoint: all are asked for again.
   const refresh = async () => {
-    const went = run && !run.ended;
+    const before = run;
     run = await get('/api/run');
     document.title = `Spartan: ${run.name}`;
     at('name').textContent = run.name;
     const have = frames ? frames.total : 0, first = have === 0, last = frames && now === frames.total - 1;
-    const again = run.frames < have || (went && run.ended);
+    const again = run.frames < have || (before && (run.generation !== before.generation || run.ended !== before.ended));
     if (run.frames !== have || again) {
       frames = append(await get(`/api/frames?from=${again ? 0 : have}`));
       at('time').max = frames.total - 1;

@@ -44,14 +44,15 @@ constexpr const char* kSceneScript = R"js(
 })();
 )js";
 
-std::vector<FrameRecord> some_of(const std::vector<FrameRecord>& frames) {
-  std::vector<FrameRecord> some;
+std::string columns_of_some(const std::vector<FrameRecord>& frames) {
+  FrameColumns columns(0, frames.empty() ? Stamp() : frames.front().stamp);
   for (const std::size_t i : spread_indices(frames.size(), kMostSceneFrames)) {
-    some.push_back(frames[i]);
-    some.back().times.clear();
-    some.back().message.clear();
+    FrameRecord frame = frames[i];
+    frame.times.clear();
+    frame.message.clear();
+    columns.add(frame);
   }
-  return some;
+  return columns.json();
 }
 
 // JSON without "<", so that no text of a run ends the element that holds it.
@@ -84,7 +85,7 @@ Result<std::string> scene_section(const std::string& run, RunStore& store, const
   const auto map = map_layers(*saved, kMostSceneCells);
   if (!map) return failure(map);
   std::string html = kFigure + data_element("scene-map", base64(*map)) +
-                     data_element("scene-frames", escaped(frame_columns(some_of(frames), 0)));
+                     data_element("scene-frames", escaped(columns_of_some(frames)));
   for (const EmbeddedFile& file : scene_files()) html += "<script>" + std::string(file.content) + "</script>\n";
   return html + "<script>" + kSceneScript + "</script>\n";
 }
