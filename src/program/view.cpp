@@ -73,8 +73,9 @@ void add_view(CLI::App& app, Context& context) {
   command->add_option("--port", a->port, "Port to listen at (default 0: any that is free; the address is printed).")
       ->check(CLI::Range(0, 65535));
   command->add_option("--address", a->address,
-                      "Address to listen at (default 127.0.0.1: this computer only). With another one anybody who "
-                      "reaches it sees the run.");
+                      "Address or name to listen at (default 127.0.0.1: this computer only). With another one, such as "
+                      "0.0.0.0 for all, anybody who reaches it sees the run; the page opens by this name, a numeric "
+                      "address, or the host name of this computer, also with .local.");
 }
 
 }  // namespace spartan::program

@@ -1,16 +1,22 @@
 #include "viewer/view_server.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <httplib.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cctype>
 #include <charconv>
 #include <chrono>
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "spartan/figures/scene_files.h"
 #include "viewer/page_files.h"
@@ -22,15 +28,40 @@ namespace {
 
 constexpr const char* kJson = "application/json";
 
+std::string in_lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+bool is_loopback(const std::string& address) {
+  return address == "127.0.0.1" || address == "localhost" || address == "::1";
+}
+
+// The hosts by which the page may be asked for at an address. Beside them, at another address than the loopback's, all
+// numeric ones.
+std::vector<std::string> hosts_of(const std::string& address) {
+  std::vector<std::string> hosts{"localhost", "127.0.0.1", "[::1]"};
+  if (is_loopback(address)) return hosts;
+  hosts.push_back(in_lower_case(address));
+  std::array<char, 256> name{};
+  if (::gethostname(name.data(), name.size() - 1) != 0) return hosts;
+  const std::string own = in_lower_case(name.data()), label = own.substr(0, own.find('.'));
+  for (const std::string& host : {own, label, label + ".local"}) {
+    if (std::find(hosts.begin(), hosts.end(), host) == hosts.end()) hosts.push_back(host);
+  }
+  return hosts;
+}
+
 // A page of another site may have a name that leads here (DNS rebinding): it is not answered.
-bool names_this_computer(const httplib::Request& request, const std::string& address) {
-  std::string host = request.get_header_value("Host");
+bool names_this_computer(const httplib::Request& request, const std::string& address,
+                         const std::vector<std::string>& hosts) {
+  std::string host = in_lower_case(request.get_header_value("Host"));
   const std::size_t port = host.rfind(':');
   if (port != std::string::npos && host.find(']', port) == std::string::npos) host.resize(port);
-  const bool is_local = address == "127.0.0.1" || address == "localhost" || address == "::1";
-  if (host == "localhost" || host == "127.0.0.1" || host == "[::1]") return true;
-  // Of another address only numbers: rebinding needs a name.
-  return !is_local && (host.starts_with('[') || host.find_first_not_of("0123456789.") == std::string::npos);
+  if (std::find(hosts.begin(), hosts.end(), host) != hosts.end()) return true;
+  // Of another address also numbers: rebinding needs a name.
+  return !is_loopback(address) && (host.starts_with('[') || host.find_first_not_of("0123456789.") == std::string::npos);
 }
 
 void answer(const Result<std::string>& content, const char* type, httplib::Response& response) {
@@ -66,6 +97,7 @@ struct ViewServer::State {
   std::unique_ptr<RunView> view;
   httplib::Server server;
   std::string address;
+  std::vector<std::string> hosts;        // hosts_of(address)
   std::atomic<bool> has_served = false;  // serve() has returned
 
   void add_routes();
@@ -80,9 +112,11 @@ void ViewServer::State::add_routes() {
     ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
   });
   server.set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
-    if (names_this_computer(request, address)) return httplib::Server::HandlerResponse::Unhandled;
+    if (names_this_computer(request, address, hosts)) return httplib::Server::HandlerResponse::Unhandled;
     response.status = 403;
-    response.set_content("ask for localhost", "text/plain; charset=utf-8");
+    response.set_content(fmt::format("not a name of this page; it can be opened by {}{}\n", fmt::join(hosts, ", "),
+                                     is_loopback(address) ? "" : ", or by a numeric address of this computer"),
+                         "text/plain; charset=utf-8");
     return httplib::Server::HandlerResponse::Handled;
   });
   server.set_default_headers(
@@ -124,11 +158,16 @@ Result<ViewServer> ViewServer::create(const ViewRequest& request) {
 
 Result<int> ViewServer::bind(const std::string& address, int port) {
   state_->address = address;
-  const int bound =
-      port == 0 ? state_->server.bind_to_any_port(address) : (state_->server.bind_to_port(address, port) ? port : -1);
-  if (bound > 0) return bound;
+  state_->hosts = hosts_of(address);
+  if (port != 0 && state_->server.bind_to_port(address, port)) return port;
+  const int any = state_->server.bind_to_any_port(address);
+  if (any <= 0) {
+    return failure(ErrorCode::usage, fmt::format("'{}' is not an address or a name of this computer", address),
+                   "--address", "0.0.0.0: all of its addresses; leave --address out: this computer only");
+  }
+  if (port == 0) return any;
   return failure(ErrorCode::output, fmt::format("port {} of {} cannot be used", port, address), "--port",
-                 "another program uses it: leave --port out");
+                 "another program uses it, or it is reserved for root: leave --port out");
 }
 
 void ViewServer::serve() {

@@ -27,7 +27,8 @@ class ViewServer {
   ViewServer& operator=(ViewServer&&) noexcept;
   ~ViewServer();
 
-  /// Binds to a port of `address`; 0: any that is free. Returns the port. Code `output`: it is in use.
+  /// Binds to a port of `address`; 0: any that is free. Returns the port. Codes: `output` (the port is in use), `usage`
+  /// (not an address of this computer).
   Result<int> bind(const std::string& address, int port);
   /// Answers until stop(), which another thread calls, once.
   void serve();
