@@ -30,7 +30,7 @@ namespace {
 // With the options by which it makes its maps.
 class PipelineValue : public Guarded<Pipeline> {
  public:
-  PipelineValue(Pipeline pipeline, MapOptions maps) : Guarded(std::move(pipeline)), maps_(std::move(maps)) {}
+  PipelineValue(Pipeline pipeline, const MapOptions& maps) : Guarded(std::move(pipeline)), maps_(maps) {}
   const MapOptions& maps() const { return maps_; }
 
  private:
