@@ -26,7 +26,7 @@ SOFTWARE_WEBGL = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "
 class Browser:
     """Pages of a view in headless Chromium; what the console tells is collected."""
 
-    def __init__(self, playwright, url):
+    def __init__(self, playwright, url=""):
         self.browser = playwright.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_WEBGL)
         self.url, self.told = url, []
 
@@ -246,9 +246,9 @@ def follow(program, run, drive):
 def check_live(program, drive, folder):
     """A page that is open while a run begins, goes on and ends."""
     run = folder / "live_run"
-    with follow(program, run, drive) as (url, process):
-        with sync_playwright() as playwright:
-            browser = Browser(playwright, url)
+    with sync_playwright() as playwright:
+        browser = Browser(playwright)  # before the run begins
+        with follow(program, run, drive) as (browser.url, process):
             with browser.page(1600) as page:
                 seen = [page.evaluate("() => spartan.state().total")]
                 while process.poll() is None:
@@ -257,7 +257,7 @@ def check_live(program, drive, folder):
                 page.wait_for_function("() => !document.getElementById('state').textContent.includes('goes on')", timeout=20000)
                 seen.append(page.evaluate("() => spartan.state().total"))
                 check("image to pose" in page.inner_text("#plots"), "latencies are plotted")
-            latencies = json_of(f"{url}/api/frames?from=0")["latency_ms"]
+            latencies = json_of(f"{browser.url}/api/frames?from=0")["latency_ms"]
             check(len(latencies) == seen[-1] and all(0 < ms < 60000 for ms in latencies), f"latencies: {latencies}")
             check(len(set(seen)) > 2 and seen == sorted(seen), f"frames arrive while the run goes on: {seen}")
             total = len([line for line in (run / "trajectory_odometry.tum").read_text().splitlines() if line[0] != "#"])

@@ -29,6 +29,7 @@ from view_requests import check, get, json_of, served
 
 def check_answers(program, run, recording):
     """Each answer against the files of the run."""
+    changed_ns = run.stat().st_mtime_ns
     with served(program, run, "--recording", recording) as url:
         about = json_of(f"{url}/api/run")
         poses = [line.split() for line in (run / "trajectory_localization.tum").read_text(encoding="utf-8").splitlines()
@@ -66,6 +67,7 @@ def check_answers(program, run, recording):
             check(get(url + path)[0] == expected, f"{path}: {get(url + path)[0]}, not {expected}")
         check(get(f"{url}/api/run", Host="evil.example")[0] == 403, "another name of this computer is refused")
         _, headers, page = get(url + "/")
+        check(run.stat().st_mtime_ns == changed_ns, "the store is read only: there is no file beside it, not even for a moment")
         check(b"http://" not in page and b"https://" not in page, "the page names no other computer")
         check("default-src 'self'" in headers["Content-Security-Policy"], "and may not load from one")
 

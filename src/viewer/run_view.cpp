@@ -8,6 +8,7 @@
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <ranges>
 #include <utility>
 #include <variant>
 
@@ -87,10 +88,10 @@ Status RunView::read_settings() {
 Status RunView::refresh() {
   const std::string version = version_of(folder_.store());
   if (version == version_) return {};
-  auto identity = RunStore::identity_of(folder_.store());
-  if (!identity) return failure(identity);
   auto store = RunStore::open_read_only(folder_.store());
   if (!store) return failure(store);
+  auto identity = store->identity();
+  if (!identity) return failure(identity);
   const bool is_other_run = identity_ && *identity != identity_;
   if (is_other_run) {
     if (Status s = read_settings(); !s) return s;
@@ -299,8 +300,8 @@ Result<std::string> RunView::landmarks(std::size_t frame) {
   if (!odometer) return failure(odometer);
   const auto images = images_of_motion(frame);
   if (!images) return failure(images);
-  for (auto image = images->rbegin(); image != images->rend(); ++image) {
-    const auto pair = imager_->process(*image);
+  for (const StereoFrame& image : std::ranges::reverse_view(*images)) {
+    const auto pair = imager_->process(image);
     if (!pair) return failure(pair);
     odometer->add(*pair);
   }

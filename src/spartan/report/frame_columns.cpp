@@ -69,6 +69,7 @@ void fill_up(Json& table, std::size_t frames) {
 }  // namespace
 
 struct FrameColumns::State {
+  State(std::size_t from, Stamp start_in);
   Json columns;
   Stamp start;
   std::size_t frames = 0;  // that were added
@@ -86,14 +87,14 @@ void FrameColumns::State::add_localization(const LocalizationRecord& localizatio
   }
 }
 
-FrameColumns::FrameColumns(std::size_t from, Stamp start) : state_(std::make_unique<State>()) {
-  state_->start = start;
-  state_->columns = {
-      {"from", from}, {"stages", Json::object()}, {"sensors", Json::object()}, {"innovations", Json::object()}};
+FrameColumns::State::State(std::size_t from, Stamp start_in) : start(start_in) {
+  columns = {{"from", from}, {"stages", Json::object()}, {"sensors", Json::object()}, {"innovations", Json::object()}};
   for (const char* name : {"t_s", "stamp_ns", "status", "message", "inliers", "matches", "landmarks", "rms_px", "pose",
                            "sigma_m", "ellipse_m2", "latency_ms", "odometry", "slam", "localization", "smoothed"})
-    state_->columns[name] = Json::array();
+    columns[name] = Json::array();
 }
+
+FrameColumns::FrameColumns(std::size_t from, Stamp start) : state_(std::make_unique<State>(from, start)) {}
 FrameColumns::FrameColumns(FrameColumns&&) noexcept = default;
 FrameColumns& FrameColumns::operator=(FrameColumns&&) noexcept = default;
 FrameColumns::~FrameColumns() = default;

@@ -319,11 +319,15 @@ Result<std::optional<RunIdentity>> RunStore::identity_of(const std::string& path
   const auto there = contains_run(path);
   if (!there) return failure(there);
   if (!*there) return std::nullopt;
-  const auto store = open_read_only(path);
+  auto store = open_read_only(path);
   if (!store) return failure(store);
-  auto identity = internal::read_identity(store->state_->db);
+  auto identity = store->identity();
   if (!identity) return failure(identity);
   return std::move(*identity);
+}
+
+Result<RunIdentity> RunStore::identity() {
+  return internal::read_identity(state_->db);
 }
 
 Result<RunStore> RunStore::create(const std::string& path, const RunIdentity& identity) {

@@ -150,6 +150,7 @@ class RunStore {
   /// Tables of the global map.
   TileStore& tiles();
 
+  Result<RunIdentity> identity();
   /// All records, or those from number `from` on, in time order. Code `store_damaged`.
   Result<std::vector<FrameRecord>> frames();
   Result<std::vector<TerrainRecord>> terrain(std::int64_t from = 0);
