@@ -2,7 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cstring>
 #include <optional>
 #include <string>
 #include <thread>
@@ -134,6 +136,48 @@ TEST(PipelineBackEnd, ContinuesFromRestoredState) {
   const auto one = uninterrupted.finish_stop().value(), other = resumed.finish_stop().value();
   ASSERT_TRUE(one && other);
   EXPECT_EQ(one->merged.corrected.pose.matrix(), other->merged.corrected.pose.matrix());
+}
+
+// Frames of a dense odometry use the computer that makes the disparities of the pending terrain view, and follow at
+// once.
+TEST(PipelineBackEnd, DenseOdometryContinuesFromRestoredState) {
+  RunOptions options = with_delay();
+  options.maps = false;
+  options.odometry.reconstruction.source = DisparitySource::dense;
+  std::vector<StereoFrame> frames;
+  for (int i = 0; i < kImages; ++i) frames.push_back(view_at("narrow", i, i, 3.0 * i));
+  Pipeline uninterrupted = Pipeline::create(mapping_rover(), options, ThreadPool(1)).value();
+  std::vector<Bytes> states;
+  std::vector<Image<float>> terrain;
+  for (const StereoFrame& frame : frames) {
+    auto result = uninterrupted.add(frame).value();
+    if (result->terrain) terrain.push_back(std::move(result->terrain->disparity));
+    states.push_back(uninterrupted.save());
+  }
+  ASSERT_FALSE(terrain.empty());
+  const testing::TemporaryFolder folder;
+  Database db = Database::open(folder.path() + "/maps.sqlite", Database::Mode::create).value();
+  TileStore tiles = TileStore::open(db).value();
+  for (const Pace pace : {Pace::recorded, Pace::live}) {
+    Pipeline resumed = Pipeline::create(mapping_rover(), options, ThreadPool(2), {}, pace).value();
+    ASSERT_TRUE(resumed.restore(states[0], tiles));
+    ASSERT_EQ(resumed.pending_frames().size(), 1U) << "the terrain view";
+    ASSERT_TRUE(resumed.restore_frame(frames[0]));
+    std::size_t views = 0;
+    for (std::size_t i = 1; i < frames.size(); ++i) {
+      const auto result = resumed.add(frames[i]).value();
+      EXPECT_EQ(resumed.save(), states[i]) << i;
+      if (!result->terrain) continue;
+      ASSERT_LT(views, terrain.size());
+      const Image<float>&expected = terrain[views++], &found = result->terrain->disparity;
+      ASSERT_EQ(found.size(), expected.size());
+      for (int y = 0; y < found.height(); ++y) {
+        const auto bytes = sizeof(float) * static_cast<std::size_t>(found.width());
+        ASSERT_EQ(std::memcmp(&found(0, y), &expected(0, y), bytes), 0) << y;
+      }
+    }
+    EXPECT_EQ(views, terrain.size());
+  }
 }
 
 TEST(PipelineBackEnd, LiveFramesDoNotWait) {

@@ -125,6 +125,8 @@ Status Pipeline::restore_frame(const StereoFrame& frame) {
   // A frame may be pending for several reasons, and is then listed and passed in several times.
   if (s.terrain_stage.pending_frame() == rectified->stamp) {
     s.terrain_stage.restore_frame(*rectified, s.pair.nearest_m, s.disparity_computer, s.back_end);
+    // The next frame of a dense odometry uses the same computer.
+    if (s.odometry_is_dense()) s.back_end.wait(s.terrain_stage.ticket());
   } else if (s.keyframe_stage.pending_frame() == rectified->stamp) {
     s.keyframe_stage.restore_frame(*rectified);
   } else {
