@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -46,6 +47,12 @@ class RunLive : public testing::RunOnSmallDrive {
   ProgramResult run_live(const std::string& output, const std::vector<std::string>& more,
                          const ProgramLimits& limits = {}) const {
     return run_program(words(output, more), limits);
+  }
+
+  // Complete rows of frames.csv.
+  static int recorded_frames(const std::string& recording) {
+    const std::string table = read_file(recording + "/frames.csv").value_or("");
+    return std::max(0, static_cast<int>(std::count(table.begin(), table.end(), '\n')) - 1);
   }
 
   // The script starts the program in the background and reads its messages. Dash has no /dev/tcp.
@@ -293,21 +300,43 @@ TEST_F(RunLive, KilledAtAnyMomentItGoesOn) {
     ProgramLimits limits;
     limits.kill_after = std::chrono::milliseconds(after_ms);
     run_live(output, {"--speed", "2", "--set", state + state_every_s}, limits);
+    // The stream does not bring what was recorded again.
+    for (int i = 0; i < std::min(recorded_frames(path(output + "/live/1")), 13); ++i) remove_pair(i);
     const ProgramResult resumed = run_live(output, {"--speed", "10", "--set", state + state_every_s, "--resume"});
     ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
     EXPECT_EQ(read_file(path(output + "/trajectory_odometry.tum")).value(), expected);
+    copy_drive();
   }
+}
+
+TEST_F(RunLive, ARecordingThatWasKilledCanBeProcessed) {
+  const std::string recording = path("recording");
+  const ProgramResult killed = run_in_shell(R"sh(rows() { wc -l < "$1/frames.csv"; }
+"$0" record "$2" -o "$1" --speed 2 -q & pid=$!
+for i in $(seq 600); do sleep 0.05; [ "$(rows "$1" 2> /dev/null || echo 0)" -gt 3 ] && break; done
+kill -KILL $pid; wait $pid)sh",
+                                            {recording, "replay:" + drive()});
+  ASSERT_EQ(killed.exit_code, 128 + SIGKILL) << killed.err;
+  ASSERT_FALSE(std::filesystem::exists(recording + "/recording.yaml"));
+  const int frames = recorded_frames(recording);
+  ASSERT_GE(frames, 3);
+  std::ofstream(recording + "/frames.csv", std::ios::app) << "14,-1,ste";
+  const ProgramResult processed = run_program({"run", recording, "-o", path("run"), "--threads", "2"});
+  ASSERT_THAT(processed.exit_code, ::testing::AnyOf(0, 6)) << processed.err;
+  EXPECT_THAT(processed.err, HasSubstr("the recording is not finished"));
+  EXPECT_EQ(summary_of(path("run"))["frames"], frames);
 }
 
 TEST_F(RunLive, ResumedTwiceItHasAllRecordings) {
   ProgramLimits limits;
   limits.kill_after = std::chrono::milliseconds(1600);
   run_live("live", {"--speed", "1.5"}, limits);
+  std::filesystem::create_directories(path("live/live/2"));  // killed before its recording had a file
   run_live("live", {"--speed", "1.5", "--resume"}, limits);
   const ProgramResult resumed = run_live("live", {"--speed", "10", "--resume"});
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   EXPECT_EQ(summary_of(path("live"))["frames"], 14);
-  EXPECT_TRUE(read_file(path("live/live/3/recording.yaml")));
+  EXPECT_TRUE(read_file(path("live/live/4/recording.yaml")));
 }
 
 // Where the rover is now its cameras see something else than at the start, which must not choose the rig again.

@@ -31,8 +31,12 @@ inline void cut(const std::string& path, double share) {
 /// Each test works on its own copy of the drive.
 class RunOnSmallDrive : public ::testing::Test {
  protected:
-  RunOnSmallDrive() {
-    std::filesystem::copy(small_runs_folder() + "/drive", drive(), std::filesystem::copy_options::recursive);
+  RunOnSmallDrive() { copy_drive(); }
+  /// What was changed in the copy is as it was.
+  void copy_drive() const {
+    namespace fs = std::filesystem;
+    fs::copy(small_runs_folder() + "/drive", drive(),
+             fs::copy_options::recursive | fs::copy_options::overwrite_existing);
   }
 
   std::string drive() const { return folder_.path() + "/drive"; }

@@ -105,7 +105,8 @@ struct OpenOptions {
   std::string times_file{};  ///< times of the frames, read by docs/reference/recording.md; empty: the recording's own
   double fps = 0;            ///< frames per second, instead of the recording's own times; 0: not stated
   int bits = 0;              ///< significant bits of a sample of 16-bit images; 0: by the calibration or the images
-  bool unfinished = false;   ///< accept a recording that is being made, with the frames that it has now
+  /// Accept a recording without recording.yaml, with the frames that it has now; that of a stream is always accepted.
+  bool unfinished = false;
 
   /// Bounds of what a user states.
   static constexpr double kLeastFps = 0.001, kMostFps = 10000, kMostPairTolerance_s = 1;

@@ -236,6 +236,8 @@ Result<RecordingWriter> RecordingWriter::create_batched(const std::string& folde
                                                         const RecordingOptions& options, ImageFiles images) {
   auto writer = create(folder, nominal_rig, options);
   if (!writer) return writer;
+  const RecordingFile file{.schema = 1, .about = options};
+  if (Status s = write_file_atomically(folder + "/" + kUnfinishedFile, dump_options(file)); !s) return failure(s);
   writer->state_->batched = true;
   writer->state_->images = images;
   return writer;
@@ -253,8 +255,10 @@ Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const
     remove_temporary_files_below(folder);
     const auto table = read_file(folder + "/frames.csv");
     if (!table) return failure(table);
-    if (fs::exists(folder + "/recording.yaml", error)) {
-      return failure(ErrorCode::output, "is a finished recording and is not overwritten", folder,
+    for (const auto& [file, kind] :
+         {std::pair{kFinishedFile, "finished recording"}, {kUnfinishedFile, "recording of a stream"}}) {
+      if (!fs::exists(folder + "/" + file, error)) continue;
+      return failure(ErrorCode::output, fmt::format("is a {} and is not overwritten", kind), folder,
                      "choose another folder");
     }
     // A resumed run may be interrupted as well: rows that it has not reached yet are kept in a file of their own.
@@ -419,7 +423,9 @@ Status RecordingWriter::finish() {
   fs::remove(state_->folder + kPreviousRowsFile, ignored);
   const RecordingFile file{.schema = 1, .about = state_->options};
   state_->lock = {};  // before the last file: a process that is killed after it leaves a finished recording
-  return write_file_atomically(state_->folder + "/recording.yaml", dump_options(file));
+  if (Status s = write_file_atomically(state_->folder + "/" + kFinishedFile, dump_options(file)); !s) return s;
+  fs::remove(state_->folder + "/" + kUnfinishedFile, ignored);
+  return {};
 }
 
 }  // namespace spartan

@@ -38,7 +38,8 @@ enum class ImageFiles {
 /// sample with code `input`, and writes nothing of it, where its stamp does not increase, a number is not finite or an
 /// image does not match the camera in the rig. A frame is on disk when `add` returns, everything else after `finish()`.
 /// A recording without recording.yaml is unfinished. create_batched() writes for a stream that does not wait for the
-/// disk: a frame is listed, and sensor samples are on disk, after the next sync(), which comes after its images.
+/// disk: a frame is listed, and sensor samples are on disk, after the next sync(), which comes after its images. It can
+/// be opened at any time (unfinished_recording.yaml).
 class RecordingWriter {
  public:
   /// Starts a recording. `nominal_rig` is written to rig.yaml. Code `output` where the folder exists and is not empty,
@@ -87,10 +88,6 @@ class RecordingWriter {
                                       FolderLock lock);
   std::unique_ptr<State> state_;
 };
-
-/// Makes an unfinished recording readable: rows that are not complete are cut off, and recording.yaml is written. Does
-/// nothing to a finished one. Codes: those of reading and writing files.
-Status finish_interrupted_recording(const std::string& folder, const StreamInfo& info);
 
 /// Copies the images of self-masks, whose names are relative to the folder `from`, to masks/CAMERA.EXTENSION of the
 /// folder `to`. Returns the rig with these names. Codes: `configuration` (a mask is missing or unreadable), `output`.

@@ -89,7 +89,7 @@ Status StreamRecorder::finish() {
   state_->changed.notify_all();
   if (state_->thread.joinable()) {
     state_->thread.join();
-    // What was written before an error stays an unfinished recording.
+    // What was written before an error stays an unfinished recording, which can be opened.
     if (state_->progress.status) state_->progress.status = state_->writer.finish();
   }
   return state_->progress.status;

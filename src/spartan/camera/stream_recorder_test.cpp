@@ -199,6 +199,42 @@ TEST(StreamRecorder, AFullDiskLeavesWhatWasWritten) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
   EXPECT_EQ(listed_frames(path), 3U);
   EXPECT_FALSE(std::filesystem::exists(path + "/recording.yaml")) << "it is not finished";
+  const auto recording = open_recording(path);
+  ASSERT_TRUE(recording) << recording.error().message();
+  EXPECT_EQ(testing::collect_samples(**recording).frames.size(), 3U);
+  EXPECT_EQ((*recording)->info().gravity_m_s2, 3.71);
+  const auto resumed = RecordingWriter::resume(path, tiny_rig(), {});
+  EXPECT_EQ(resumed.error().code, ErrorCode::output) << "a simulation does not overwrite it";
+}
+
+// As after a loss of power while tables were written.
+TEST(StreamRecorder, WhatIsNotWholeInItsTablesIsLeftOut) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/recording", finished = path + "/recording.yaml";
+  {
+    const auto recorder = StreamRecorder::create(path, tiny_stream(), ImageFiles::pnm).value();
+    for (int i = 0; i < 3; ++i) recorder->add(tiny_frame(i));
+    recorder->add(ImuSample{Stamp{1}, {0, 0, 0}, {0, 0, 9.8}});
+    ASSERT_TRUE(recorder->finish());
+  }
+  const std::string frames = read_file(path + "/frames.csv").value();
+  EXPECT_FALSE(std::filesystem::exists(path + "/unfinished_recording.yaml"));
+  const std::string cut = frames.substr(0, frames.size() - 20), zeros = cut + std::string(4096, '\0') + "00\n";
+  for (const std::string& damaged : {cut, zeros}) {
+    static_cast<void>(folder.write("recording/frames.csv", damaged));
+    for (const std::string table : {"", "stamp_ns,gyro_x"}) {
+      static_cast<void>(folder.write("recording/sensors/imu.csv", table));
+      std::filesystem::rename(finished, path + "/unfinished_recording.yaml");
+      const auto recording = open_recording(path);
+      ASSERT_TRUE(recording) << recording.error().message();
+      const auto samples = testing::collect_samples(**recording);
+      EXPECT_EQ(samples.error, "");
+      EXPECT_EQ(samples.all.size(), 2U);
+      EXPECT_FALSE((*recording)->info().sequence.warnings.empty());
+      std::filesystem::rename(path + "/unfinished_recording.yaml", finished);
+      EXPECT_FALSE(open_recording(path)) << "a finished recording is damaged";
+    }
+  }
 }
 
 // Killed at any time, every listed frame has both images.
@@ -219,7 +255,6 @@ TEST(StreamRecorder, KilledLeavesOnlyWholeFrames) {
     int status = 0;
     ASSERT_EQ(::waitpid(child, &status, 0), child);
     EXPECT_TRUE(after_ms < 1000 || listed_frames(path) > 100U);
-    ASSERT_TRUE(write_file_atomically(path + "/recording.yaml", "schema: 1\n"));  // as a user may finish it
     const auto recording = open_recording(path);
     if (!recording) continue;  // nothing was listed yet
     const auto samples = testing::collect_samples(**recording);

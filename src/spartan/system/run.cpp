@@ -55,14 +55,13 @@ struct RunSource {
 };
 
 // What a live run has recorded until it was interrupted.
-Result<std::vector<std::unique_ptr<Recording>>> recordings_of(const RunFolder& folder, const StreamInfo& info,
-                                                              const Log& log) {
+Result<std::vector<std::unique_ptr<Recording>>> recordings_of(const RunFolder& folder, const Log& log) {
   std::vector<std::unique_ptr<Recording>> recordings;
-  OpenOptions accepted;  // the stream has paired its images
-  accepted.pair_tolerance_s = std::numeric_limits<double>::infinity();
+  OpenOptions accepted;
+  accepted.unfinished = true;
+  accepted.pair_tolerance_s = std::numeric_limits<double>::infinity();  // the stream has paired its images
   std::error_code error;
   for (int i = 1; std::filesystem::exists(folder.recording(i), error); ++i) {
-    if (Status s = finish_interrupted_recording(folder.recording(i), info); !s) return failure(s);
     auto recording = open_recording(folder.recording(i), accepted);
     // Such as one that was interrupted before it listed a frame.
     if (!recording && recording.error().code == ErrorCode::input) {
@@ -297,7 +296,7 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   if (!recorder) return failure(recorder);
   std::optional<ResumedStream> resumed;
   if (source.queue && request.resume) {
-    auto recordings = recordings_of(folder, info, hooks.log);
+    auto recordings = recordings_of(folder, hooks.log);
     if (!recordings) return failure(recordings);
     resumed.emplace(std::move(*recordings), *source.queue);
   }

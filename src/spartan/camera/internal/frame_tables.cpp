@@ -148,7 +148,8 @@ Result<EurocImages> read_euroc_images(TableReader table) {
   return images;
 }
 
-Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std::string& folder, const Rig& rig) {
+Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std::string& folder, const Rig& rig,
+                                                    bool unfinished) {
   std::vector<FrameEntry> frames;
   const std::vector<std::optional<std::size_t>> columns = table.columns();
   const std::string pair = default_pair(rig);
@@ -167,7 +168,7 @@ Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std
     frames.push_back(std::move(*entry));
     return {};
   });
-  if (!status) return failure(status);
+  if (!status && !(unfinished && status.error().code == ErrorCode::input)) return failure(status);
   return frames;
 }
 

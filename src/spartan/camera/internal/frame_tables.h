@@ -29,8 +29,10 @@ struct EurocImages {
 Result<EurocImages> read_euroc_images(TableReader table);
 
 /// Spartan, frames.csv (docs/reference/recording.md). `folder` is prepended to the image paths; an empty field stays
-/// empty.
-Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std::string& folder, const Rig& rig);
+/// empty. `unfinished`: the frames before the first row that cannot be parsed, where the writing of the table has
+/// ended.
+Result<std::vector<FrameEntry>> read_spartan_frames(TableReader table, const std::string& folder, const Rig& rig,
+                                                    bool unfinished = false);
 /// Table format of frames.csv.
 TableFormat spartan_frames_format();
 

@@ -8,6 +8,9 @@
 
 namespace spartan::internal {
 
+inline constexpr const char* kFinishedFile = "recording.yaml";
+/// The properties of a recording of a stream until it is finished, which recording.yaml replaces.
+inline constexpr const char* kUnfinishedFile = "unfinished_recording.yaml";
 inline constexpr const char* kFramesHeader =
     "frame_id,position_id,pair,left_stamp_ns,right_stamp_ns,left,right,pan_deg,tilt_deg,exposure_us,gain,bits";
 inline constexpr const char* kLeastFramesHeader = "left_stamp_ns,left,right";  ///< of a list that is written by hand

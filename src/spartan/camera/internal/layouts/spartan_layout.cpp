@@ -29,16 +29,18 @@ Result<RigChoice> rig_of(const fs::path& folder, const OpenOptions& options) {
                  "add the file, or give a calibration with --rig");
 }
 
-// Properties from recording.yaml. A list of frames that was written by hand needs none, a recording that is being made
-// has none yet.
-Status read_properties(const fs::path& folder, bool may_have_none, RecordingInfo& info) {
+// The file that states the properties of a recording; empty where there is none, as in a list of frames that was
+// written by hand, or in a simulation that is not finished.
+std::string properties_file(const fs::path& folder) {
   std::error_code error;
-  if (!fs::exists(folder / "recording.yaml", error)) {
-    if (may_have_none) return {};
-    return failure(ErrorCode::input, "has no recording.yaml: the recording was not finished", folder.string(),
-                   "resume or repeat the recording");
+  for (const char* const name : {kFinishedFile, kUnfinishedFile}) {
+    if (fs::exists(folder / name, error)) return name;
   }
-  auto file = load_options<RecordingFile>((folder / "recording.yaml").string());
+  return {};
+}
+
+Status read_properties(const fs::path& path, RecordingInfo& info) {
+  auto file = load_options<RecordingFile>(path.string());
   if (!file) return failure(file);
   info.name = file->about.name;
   info.description = file->about.description;
@@ -68,8 +70,17 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   RecordingIndex index;
   auto table = TableReader::open((folder / "frames.csv").string(), spartan_frames_format());
   const bool by_hand = table && !table->has_all_columns();
-  if (Status status = read_properties(folder, by_hand || options.unfinished, index.info); !status)
-    return failure(status);
+  const std::string properties = properties_file(folder);
+  if (properties.empty() && !by_hand && !options.unfinished) {
+    return failure(ErrorCode::input, "has no recording.yaml: the recording was not finished", folder.string(),
+                   "resume or repeat the recording");
+  }
+  if (!properties.empty()) {
+    if (Status status = read_properties(folder / properties, index.info); !status) return failure(status);
+  }
+  const bool unfinished = properties != kFinishedFile && !by_hand;
+  if (unfinished)
+    index.info.sequence.warnings.emplace_back("the recording is not finished; what it has until now is used");
   if (!table) {
     table.error().hint = hint_of_other_table(folder / "frames.csv");
     return failure(table);
@@ -78,7 +89,7 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   if (!rig) return failure(rig);
   index.info.rig = std::move(rig->rig);
   index.info.rig_source = rig->source;
-  auto frames = read_spartan_frames(std::move(*table), folder.string(), index.info.rig);
+  auto frames = read_spartan_frames(std::move(*table), folder.string(), index.info.rig, unfinished);
   if (!frames) return failure(frames);
   index.frames = std::move(*frames);
   if (const fs::path truth = folder / "truth" / "poses.tum"; fs::exists(truth, error))
@@ -87,10 +98,16 @@ Result<RecordingIndex> index_spartan(const LayoutChoice& layout, const OpenOptio
   const fs::path sensors = folder / "sensors";
   const auto stream = [&](const char* name, const char* header, std::size_t fields,
                           const RowReader& reader) -> SensorStreamFactory {
-    if (!fs::exists(sensors / name, error)) return {};
-    index.sensor_files.push_back((sensors / name).string());
-    return stream_of_table((sensors / name).string(), {.separator = ',', .header = header, .ends_with_newline = true},
-                           fields, reader);
+    const std::string file = (sensors / name).string();
+    if (!fs::exists(file, error)) return {};
+    const TableFormat format{.separator = ',', .header = header, .ends_with_newline = true};
+    if (unfinished) {
+      // Interrupted before its header was on disk.
+      const auto opened = TableReader::open(file, format);
+      if (!opened && opened.error().code == ErrorCode::input) return {};
+    }
+    index.sensor_files.push_back(file);
+    return stream_of_table(file, format, fields, reader);
   };
   index.imu = stream("imu.csv", kImuHeader, 7, read_imu_row(index.info.rig.imu.body_from_imu.rotation()));
   for (SensorStreamFactory other : {stream("wheels.csv", kWheelsHeader, 3, read_wheel_row),
