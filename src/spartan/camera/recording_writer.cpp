@@ -157,6 +157,7 @@ struct RecordingWriter::State {
   std::optional<TableFile> frames;
   std::map<std::string, std::string> previous_rows;  // rows of the interrupted run: left image → row
   std::map<std::string, TableFile> sensors;
+  bool has_new_tables = false;        // of sensors, whose names are not on disk yet
   std::map<std::string, Stamp> last;  // last stamp of each pair and each sensor
   bool batched = false;
   ImageFiles images = ImageFiles::png;
@@ -210,6 +211,7 @@ struct RecordingWriter::State {
       auto table = TableFile::create(folder + "/sensors/" + name, header);
       if (!table) return failure(table);
       found = sensors.emplace(name, std::move(*table)).first;
+      has_new_tables = true;
     }
     std::string row = std::to_string(stamp.ns);
     for (const double number : numbers) row += fmt::format(",{}", number);
@@ -375,6 +377,10 @@ Status RecordingWriter::sync() {
   for (auto& [name, table] : state.sensors) {
     if (Status s = table.sync(); !s) return s;
   }
+  if (state.has_new_tables) {
+    if (Status s = sync_folder(state.folder + "/sensors"); !s) return s;
+  }
+  state.has_new_tables = false;
   return {};
 }
 
