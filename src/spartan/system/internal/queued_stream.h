@@ -3,7 +3,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -29,6 +31,8 @@ class QueuedStream : public StreamDecorator {
   Result<StreamRead> read(std::chrono::nanoseconds timeout) override;
   /// Records every sample as it arrives. Before the first call of read().
   void record_with(std::unique_ptr<StreamRecorder> recorder) { recorder_ = std::move(recorder); }
+  /// Numbers of frames, also in the recording, go on after this one. Before the first call of read().
+  void number_after(std::int64_t last_id) { last_id_ = last_id; }
   /// Null where nothing is recorded.
   StreamRecorder* recorder() { return recorder_.get(); }
   /// Ends the thread; the samples in the queue can still be read.
@@ -40,9 +44,11 @@ class QueuedStream : public StreamDecorator {
 
  private:
   void pump();
+  void number(Sample& sample);
 
   std::unique_ptr<StreamRecorder> recorder_;
   SampleQueue queue_;
+  std::optional<std::int64_t> last_id_, id_offset_;  // offset: from the first frame on
   std::atomic<bool> stop_ = false;
   std::thread thread_;
 };

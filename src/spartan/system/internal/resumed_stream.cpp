@@ -5,15 +5,6 @@
 #include <variant>
 
 namespace spartan::internal {
-namespace {
-
-std::int64_t* id_of(Sample& sample) {
-  if (auto* frame = std::get_if<StereoFrame>(&sample)) return &frame->frame_id;
-  if (auto* missing = std::get_if<MissingFrame>(&sample)) return &missing->frame_id;
-  return nullptr;
-}
-
-}  // namespace
 
 Result<StreamRead> ResumedStream::read(std::chrono::nanoseconds timeout) {
   while (is_catching_up()) {
@@ -23,36 +14,29 @@ Result<StreamRead> ResumedStream::read(std::chrono::nanoseconds timeout) {
       ++next_;
       continue;
     }
-    if (const std::int64_t* id = id_of(**sample)) last_id_ = std::max(last_id_, *id);
-    if (is_new(**sample))
+    if (const auto* frame = std::get_if<StereoFrame>(&**sample)) last_id_ = std::max(last_id_, frame->frame_id);
+    if (const auto* missing = std::get_if<MissingFrame>(&**sample)) last_id_ = std::max(last_id_, missing->frame_id);
+    if (is_new(source_of(**sample), stamp_of(**sample)))
       return StreamRead{StreamRead::State::sample, std::move(*sample), std::chrono::steady_clock::now()};
   }
-  if (!std::exchange(live_has_begun_, true) && !last_.empty()) {
+  if (!std::exchange(live_has_begun_, true)) {
+    live_.number_after(last_id_);
     const auto latest =
         std::max_element(last_.begin(), last_.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-    behind().start_after(latest->second);
+    if (latest != last_.end()) live_.start_after(latest->second);
   }
-  auto read = behind().read(timeout);
+  auto read = live_.read(timeout);
   if (!read || read->state != StreamRead::State::sample) return read;
-  if (!is_new(*read->sample)) return StreamRead{StreamRead::State::none_yet, {}, read->arrived};
-  number(*read->sample);
+  if (!is_new(source_of(*read->sample), stamp_of(*read->sample)))
+    return StreamRead{StreamRead::State::none_yet, {}, read->arrived};
   return read;
 }
 
-bool ResumedStream::is_new(const Sample& sample) {
-  const auto [last, first] = last_.try_emplace(source_of(sample), stamp_of(sample));
-  if (!first && stamp_of(sample) <= last->second) return false;
-  last->second = stamp_of(sample);
+bool ResumedStream::is_new(const std::string& source, Stamp stamp) {
+  const auto [last, first] = last_.try_emplace(source, stamp);
+  if (!first && stamp <= last->second) return false;
+  last->second = stamp;
   return true;
-}
-
-// A stream that has begun again counts from 0.
-void ResumedStream::number(Sample& sample) {
-  std::int64_t* const id = id_of(sample);
-  if (id == nullptr) return;
-  if (*id + id_offset_ <= last_id_) id_offset_ = last_id_ + 1 - *id;
-  *id += id_offset_;
-  last_id_ = *id;
 }
 
 Result<StereoFrame> ResumedStream::frame_at(const std::string& pair, Stamp left_stamp) {

@@ -61,7 +61,7 @@ Status RunLoop::begin() {
   elapsed_before_ = (*checkpoint)->elapsed;
   resumed_ = true;
   hooks_.log.info(fmt::format("resuming after frame {}", frames->back().frame_id));
-  return seek(**checkpoint);
+  return seek(**checkpoint, frames->back().frame_id);
 }
 
 // Of a live run the frames may not have been recorded: with a disk that was full, or without a recording.
@@ -89,10 +89,10 @@ Result<StereoFrame> RunLoop::frame_at(const FrameKey& key) {
                     : resumed_stream_->frame_at(key.pair, key.left_stamp);
 }
 
-Status RunLoop::seek(const RunStore::Checkpoint& checkpoint) {
+Status RunLoop::seek(const RunStore::Checkpoint& checkpoint, std::int64_t last_id) {
   if (!recording_) {
     last_stamps_ = checkpoint.source.last_stamps;
-    resumed_stream_->skip_until(last_stamps_);
+    resumed_stream_->skip_until(last_stamps_, last_id);
     return {};
   }
   if (Status sought = recording_->seek(checkpoint.source.samples_taken); !sought) return sought;

@@ -85,7 +85,7 @@ class RunLoop {
  private:
   Status process_until_end();
   Result<StreamRead> read();
-  Status seek(const RunStore::Checkpoint& checkpoint);
+  Status seek(const RunStore::Checkpoint& checkpoint, std::int64_t last_id);
   Status restore_pending_frames();
   Result<StereoFrame> frame_at(const FrameKey& key);
   Status process(const Sample& sample);
