@@ -45,6 +45,13 @@ struct RecordingInfo : StreamInfo {
   std::string truth_file;  ///< ground-truth trajectory of the recording; empty without one
 };
 
+/// What is known of a sample before its images are read.
+struct SampleKey {
+  std::string source;                    ///< source_of()
+  Stamp stamp;                           ///< stamp_of()
+  std::optional<std::int64_t> frame_id;  ///< of a frame, also of one that is missing
+};
+
 /// Yields samples ordered by stamp. At equal stamps the order is IMU, wheels, compass, inclinometer, then frames in the
 /// order in which the recording lists them. A frame with a reversed stamp is played after the frame listed before it.
 /// Sensor samples (not frames) whose stamps do not increase within their table are discarded, as few as possible.
@@ -62,6 +69,11 @@ class Recording : public SampleStream {
   /// `read_error` and `resources` where the system cannot read a file that is there. The frame concerned was not taken,
   /// so the call may be repeated; after an error in a sensor table every call fails.
   virtual Result<std::optional<Sample>> next() = 0;
+
+  /// Of the sample that next() will take; nothing at the end. Codes: those of next() for sensor tables.
+  virtual Result<std::optional<SampleKey>> peek() = 0;
+  /// Takes the next sample without opening its images, which are then no part of content_hash(). Codes: as peek().
+  virtual Status skip() = 0;
 
   /// Moves the read position to just after the first `samples_taken` samples of any kind (MissingFrame included),
   /// without decoding an image; their files are read for content_hash(). Positions are counts and not stamps, since

@@ -129,6 +129,22 @@ class IndexedRecording : public Recording {
     return std::move(*sample);
   }
 
+  Result<std::optional<SampleKey>> peek() override {
+    const auto following = find_next();
+    if (!following) return failure(following);
+    if (following->sensor) {
+      const Sample& sample = *following->sensor->head();
+      return SampleKey{source_of(sample), stamp_of(sample), {}};
+    }
+    if (!following->entry) return std::nullopt;
+    return SampleKey{following->entry->pair, following->entry->left_stamp, following->entry->frame_id};
+  }
+
+  Status skip() override {
+    const auto taken = take();
+    return taken ? Status() : failure(taken);
+  }
+
   Status seek(std::int64_t samples_taken) override {
     started_ = false;
     content_hash_ = {};
@@ -235,8 +251,13 @@ class IndexedRecording : public Recording {
     const FrameEntry* entry = nullptr;
   };
 
-  // Advances to the next item without decoding an image.
-  Result<Taken> take() {
+  // What take() will take; neither at the end.
+  struct Following {
+    SensorHead* sensor = nullptr;
+    const FrameEntry* entry = nullptr;
+  };
+
+  Result<Following> find_next() {
     if (!started_) {
       next_frame_ = 0;
       for (SensorHead& sensor : sensors_) {
@@ -249,14 +270,22 @@ class IndexedRecording : public Recording {
       if (sensor.head() && (!first || stamp_of(*sensor.head()) < stamp_of(*first->head()))) first = &sensor;
     }
     const FrameEntry* entry = next_frame_ < index_.frames.size() ? &index_.frames[next_frame_] : nullptr;
-    if (first && (!entry || stamp_of(*first->head()) <= entry->playback_stamp)) {
-      Taken taken{*first->head(), nullptr};
-      if (Status status = first->advance(); !status) return failure(status);
+    const bool is_sensor = first && (!entry || stamp_of(*first->head()) <= entry->playback_stamp);
+    return is_sensor ? Following{first, nullptr} : Following{nullptr, entry};
+  }
+
+  // Advances to the next item without decoding an image.
+  Result<Taken> take() {
+    const auto following = find_next();
+    if (!following) return failure(following);
+    if (following->sensor) {
+      Taken taken{*following->sensor->head(), nullptr};
+      if (Status status = following->sensor->advance(); !status) return failure(status);
       content_hash_.add(*taken.sensor);
       return taken;
     }
-    if (entry) ++next_frame_;
-    return Taken{std::nullopt, entry};
+    if (following->entry) ++next_frame_;
+    return Taken{std::nullopt, following->entry};
   }
 
   // The frame, or a MissingFrame that says why there is none. Code `resources`: no memory to decode an image.

@@ -2,22 +2,30 @@
 
 #include <algorithm>
 #include <utility>
-#include <variant>
 
 namespace spartan::internal {
 
+// Samples that were processed are skipped without their images: those of hours are many GB. This can take a while, so
+// it returns after `timeout`.
 Result<StreamRead> ResumedStream::read(std::chrono::nanoseconds timeout) {
+  const auto until = std::chrono::steady_clock::now() + timeout;
   while (is_catching_up()) {
-    auto sample = recordings_[next_]->next();
-    if (!sample) return failure(sample);
-    if (!*sample) {
+    Recording& recording = *recordings_[next_];
+    const auto key = recording.peek();
+    if (!key) return failure(key);
+    if (!*key) {
       ++next_;
       continue;
     }
-    if (const auto* frame = std::get_if<StereoFrame>(&**sample)) last_id_ = std::max(last_id_, frame->frame_id);
-    if (const auto* missing = std::get_if<MissingFrame>(&**sample)) last_id_ = std::max(last_id_, missing->frame_id);
-    if (is_new(source_of(**sample), stamp_of(**sample)))
+    last_id_ = std::max(last_id_, (*key)->frame_id.value_or(last_id_));
+    if (is_new((*key)->source, (*key)->stamp)) {
+      auto sample = recording.next();
+      if (!sample) return failure(sample);
       return StreamRead{StreamRead::State::sample, std::move(*sample), std::chrono::steady_clock::now()};
+    }
+    if (Status skipped = recording.skip(); !skipped) return failure(skipped);
+    if (const auto now = std::chrono::steady_clock::now(); now >= until)
+      return StreamRead{StreamRead::State::none_yet, {}, now};
   }
   if (!std::exchange(live_has_begun_, true)) {
     live_.number_after(last_id_);

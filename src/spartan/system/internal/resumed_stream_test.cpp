@@ -107,5 +107,38 @@ TEST_F(ResumedStreamTest, NumbersGoOnWithoutARecording) {
   EXPECT_THAT(execute(4, 5, 2), ElementsAre(5, 6));
 }
 
+// Reading these images fails: those of hours would be many GB.
+TEST_F(ResumedStreamTest, SkipsWhatWasProcessedWithoutItsImages) {
+  constexpr int kFrames = 40, kProcessed = 30;
+  {
+    auto writer = RecordingWriter::create(recording(1), testing::tiny_rig(), {}).value();
+    for (int i = 0; i < kFrames; ++i) ASSERT_TRUE(writer.add(numbered_frame(i, i)));
+    ASSERT_TRUE(writer.finish());
+  }
+  std::vector<std::unique_ptr<Recording>> recorded;
+  recorded.push_back(open_recording(recording(1)).value());
+  for (int i = 0; i <= kProcessed; ++i) {
+    const std::string image = recording(1) + "/images/stereo/" + std::to_string(stamp_of_number(i).ns) + "_left.png";
+    std::filesystem::remove(image);
+    std::filesystem::create_symlink("/proc/self/mem", image);
+  }
+  CountingCamera camera(kFrames, 1);
+  QueuedStream queue(camera, "stereo", kTinyQueueBytes);
+  ResumedStream stream(std::move(recorded), queue);
+  stream.skip_until({{"stereo", stamp_of_number(kProcessed)}}, kProcessed);
+  int waits = 0;
+  std::vector<std::int64_t> ids;
+  while (stream.is_catching_up()) {
+    const auto read = stream.read(0ns);
+    ASSERT_TRUE(read) << read.error().message();
+    waits += read->state == StreamRead::State::none_yet;
+    if (read->sample) {
+      if (const auto* frame = std::get_if<StereoFrame>(&*read->sample)) ids.push_back(frame->frame_id);
+    }
+  }
+  EXPECT_GE(waits, kProcessed) << "a run can be stopped meanwhile";
+  EXPECT_THAT(ids, ElementsAre(31, 32, 33, 34, 35, 36, 37, 38, 39));
+}
+
 }  // namespace
 }  // namespace spartan::internal
