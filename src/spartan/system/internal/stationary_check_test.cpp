@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 namespace spartan::internal {
 namespace {
 
@@ -37,6 +39,27 @@ TEST(StationaryCheck, TheGyroscopeAloneDoesNotShowASpeed) {
   EXPECT_TRUE(check.is_stationary());
   check.add(ImuSample{at(4), {0, 0, 0.5}, {0, 0, 9.8}});
   EXPECT_FALSE(check.is_stationary());
+  EXPECT_TRUE(check.drives());
+}
+
+// As in EuRoC's recordings: a bias of 0.08 rad/s, and noise.
+TEST(StationaryCheck, ABiasOfTheGyroscopeIsNoMotion) {
+  StationaryCheck check;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> noise(0, 0.007);
+  const auto sample_at = [&](double seconds, double rate_rad_s) {
+    return ImuSample{
+        at(seconds), {0.002 + noise(random), 0.021 + noise(random), rate_rad_s + noise(random)}, {0, 0, 9.8}};
+  };
+  for (int i = 0; i < 200; ++i) {
+    check.add(sample_at(0.005 * i, 0.078));
+    EXPECT_FALSE(check.drives()) << i;
+    if (i % 20 == 0) check.add(frame_at(0.005 * i, 0.001));
+  }
+  EXPECT_TRUE(check.is_stationary());
+  for (int i = 200; i < 220; ++i) check.add(sample_at(0.005 * i, 0.078 + 0.1));
+  EXPECT_EQ(check.state(), StationaryCheck::State::shaken) << "it begins to turn";
+  check.add(sample_at(1.1, 0.5));
   EXPECT_TRUE(check.drives());
 }
 
