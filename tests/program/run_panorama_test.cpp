@@ -101,6 +101,16 @@ class RunPanorama : public ::testing::Test {
     return views;
   }
 
+  // Of pan and tilt, as the run has used it.
+  double stated_error_deg() const {
+    const std::string options = read_file(folder_.path() + "/run/config.yaml").value();
+    const std::string key = "pan_tilt_deg:";
+    return std::stod(options.substr(options.find(key) + key.size()));
+  }
+  static double rig_error_deg(const Rig& rig) {
+    return rig.calibration_errors ? rig.calibration_errors->pan_tilt_deg : CalibrationErrors().pan_tilt_deg;
+  }
+
   testing::TemporaryFolder folder_;
   std::mutex mutex_;
   std::vector<PanoramaEvent> events_;
@@ -163,12 +173,27 @@ TEST_F(RunPanorama, ByAnEmulatedUnitOnASerialLine) {
     EXPECT_NEAR(views[i].tilt_rad, 45 * kDegree, step_rad);
   }
   // What its steps leave of an angle enters the variance of the maps, beside the error of its calibration.
-  const std::string options = read_file(folder_.path() + "/run/config.yaml").value();
-  const std::size_t key = options.find("pan_tilt_deg:");
-  ASSERT_NE(key, std::string::npos);
-  const auto& stated = simulation.info().rig.calibration_errors;
-  const double stated_deg = stated ? stated->pan_tilt_deg : CalibrationErrors().pan_tilt_deg;
-  EXPECT_NEAR(std::stod(options.substr(key + 13)), std::hypot(stated_deg, step_rad / kDegree / std::sqrt(12.0)), 1e-9);
+  EXPECT_NEAR(stated_error_deg(),
+              std::hypot(rig_error_deg(simulation.info().rig), step_rad / kDegree / std::sqrt(12.0)), 1e-9);
+}
+
+// Until a panorama is asked for, the rover takes the views that its scenario plans.
+TEST_F(RunPanorama, CommandsThatDoNotComeChangeNothing) {
+  std::vector<std::string> frames;
+  for (const bool with_commands : {false, true}) {
+    LiveSimulation simulation(small_request("stops_m: [0]"), 0, ThreadPool(1));
+    RunRequest request = this->request();
+    request.options.panorama.every_m = 0;
+    request.options.exposure.enabled = false;  // when a setting has effect depends on the time
+    request.output += with_commands ? "_with" : "_without";
+    RunHooks hooks;
+    if (with_commands) hooks.command = [] { return std::optional<RunCommand>(); };
+    const auto outcome = run_live(simulation, request, hooks);
+    ASSERT_TRUE(outcome) << outcome.error().message();
+    frames.push_back(read_file(request.output + "/live/1/frames.csv").value());
+  }
+  EXPECT_THAT(frames[0], HasSubstr("wide"));
+  EXPECT_EQ(frames[0], frames[1]);
 }
 
 TEST_F(RunPanorama, NeedsAUnit) {

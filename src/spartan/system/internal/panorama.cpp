@@ -16,7 +16,18 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr std::chrono::milliseconds kPoll{20};
-constexpr int kAttempts = 3;  // of a motion, and of a frame
+constexpr std::chrono::milliseconds kRetry{200};  // of a return to rest
+
+const char* reason_of(StationaryCheck::State state) {
+  switch (state) {
+    case StationaryCheck::State::unknown:
+      return "neither frames nor wheels show whether it is stationary";
+    case StationaryCheck::State::moves:
+      return "frames or wheels show that it moves";
+    default:
+      return "the gyroscope shows that it moves";
+  }
+}
 
 }  // namespace
 
@@ -46,7 +57,11 @@ Panorama::Panorama(const Rig& rig, const std::string& odometry_pair, const Panor
       pairs_.insert(pair.name);
     }
   }
-  if (!pairs_.empty()) thread_ = std::thread([this] { run(); });
+  if (pairs_.empty()) return;
+  const bool rests = is_at_rest();
+  untouched_ = rests && !(options_.every_m > 0);
+  phase_ = rests ? Phase::idle : Phase::returning;
+  thread_ = std::thread([this] { run(); });
 }
 
 Panorama::~Panorama() {
@@ -71,16 +86,29 @@ void Panorama::update(Stamp stamp) {
     return;
   }
   const bool due = options_.every_m > 0 && distance_m_ >= next_at_m_;
-  if ((!due && !requested_) || !check_.is_stationary()) return;
-  requested_ = rover_moved_ = false;
+  if (!due && !requested_) return;
+  const StationaryCheck::State state = check_.state();
+  if (state != StationaryCheck::State::stationary) return explain_waiting(stamp, state);
+  waits_since_.reset();
+  requested_ = rover_moved_ = explained_ = false;
   next_at_m_ = distance_m_ + options_.every_m;
   wanted_ = true;
   changed_.notify_all();
 }
 
+// Once for each panorama. One that is due by distance waits for the next stop, however far that is.
+void Panorama::explain_waiting(Stamp stamp, StationaryCheck::State state) {
+  if (!waits_since_ || (!requested_ && state == StationaryCheck::State::moves)) waits_since_ = stamp;
+  if (explained_ || seconds_between(*waits_since_, stamp) < kPatience_s) return;
+  explained_ = true;
+  hooks_.log.warning(fmt::format("a panorama has waited for {:.0f} s for the rover to be stationary: {}", kPatience_s,
+                                 reason_of(state)));
+}
+
 bool Panorama::label(StereoFrame& frame) {
   const std::lock_guard lock(mutex_);
   latest_ = std::max(latest_, frame.left_stamp);
+  if (untouched_) return true;
   frame.position_id = phase_ == Phase::idle || rover_moved_ ? -1 : position_id_;
   if (frame.pair == odometry_pair_) {
     frame.pan_rad = rest_.pan_rad;
@@ -88,7 +116,8 @@ bool Panorama::label(StereoFrame& frame) {
     return phase_ == Phase::idle;
   }
   if (!pairs_.contains(frame.pair)) return true;
-  if (phase_ != Phase::taking || missing_.erase(frame.pair) == 0) return false;
+  const bool one_image = frame.left.empty() != frame.right.empty();
+  if (one_image || phase_ != Phase::taking || missing_.erase(frame.pair) == 0) return false;
   frame.pan_rad = angles_.pan_rad;
   frame.tilt_rad = angles_.tilt_rad;
   ++views_;
@@ -97,6 +126,7 @@ bool Panorama::label(StereoFrame& frame) {
 }
 
 void Panorama::run() {
+  return_to_rest();
   for (;;) {
     {
       std::unique_lock lock(mutex_);
@@ -106,11 +136,12 @@ void Panorama::run() {
       // Larger than that of every panorama before, in this run and in one that it resumes.
       position_id_ = std::max(position_id_ + 1, static_cast<std::int64_t>(std::time(nullptr)));
       phase_ = Phase::moving;
+      untouched_ = false;
       views_ = 0;
     }
     report(true);
     take_all();
-    set_phase(Phase::idle);
+    return_to_rest();
     report(false);
   }
 }
@@ -131,13 +162,41 @@ void Panorama::take_all() {
   if (tilts_deg.empty()) tilts_deg = {rest_.tilt_rad / kDegree};
   for (const double tilt_deg : tilts_deg) {
     for (const double pan_deg : options_.pans_deg) {
-      if (!look_at({pan_deg * kDegree, tilt_deg * kDegree})) break;
+      if (look_at({pan_deg * kDegree, tilt_deg * kDegree})) continue;
+      const std::lock_guard lock(mutex_);
+      if (rover_moved_) hooks_.log.warning("the panorama ends early: the rover moves");
+      return;
     }
   }
-  set_phase(Phase::moving);
-  if (const Status moved = unit_.move_to(rest_); !moved) hooks_.log.warning("panorama: " + moved.error().message());
-  const std::lock_guard lock(mutex_);
-  if (rover_moved_) hooks_.log.warning("the panorama ends early: the rover moves");
+}
+
+// Whether the unit is at rest now, up to the rounding of its angles.
+bool Panorama::is_at_rest() {
+  constexpr double kLeast_rad = 1e-9;
+  const double most_rad = 2 * unit_.sigma_rad() + kLeast_rad;
+  const auto reading = unit_.read();
+  return reading && !reading->moves && std::abs(reading->angles.pan_rad - rest_.pan_rad) <= most_rad &&
+         std::abs(reading->angles.tilt_rad - rest_.tilt_rad) <= most_rad;
+}
+
+// Then the phase is idle. The odometry on the unit would go on with wrong angles, so its return is tried for ever.
+void Panorama::return_to_rest() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (phase_ == Phase::idle) return;
+    phase_ = Phase::returning;
+  }
+  for (int attempt = 1;; ++attempt) {
+    const auto reading = settle(rest_);
+    if (reading && !wait(std::chrono::duration<double>(options_.settle_s))) return;
+    if (reading || !wait({})) break;
+    if (attempt <= kAttempts) hooks_.log.warning("panorama, return to rest: " + reading.error().message());
+    const bool gives_up = attempt >= kAttempts || reading.error().code == ErrorCode::input;  // beyond its limits
+    if (gives_up && odometry_pair_.empty()) break;
+    if (attempt == kAttempts) hooks_.log.error("the odometry waits until the pan-tilt unit has returned to rest");
+    if (!wait(kRetry)) break;
+  }
+  set_phase(Phase::idle);
 }
 
 // Waits, unless the panorama ends. Whether it goes on.
@@ -169,7 +228,7 @@ Result<PanTiltReading> Panorama::settle(const PanTiltAngles& angles) {
 // Whether the panorama goes on.
 bool Panorama::look_at(const PanTiltAngles& angles) {
   set_phase(Phase::moving);
-  for (int attempt = 1; attempt <= kAttempts; ++attempt) {
+  for (int attempt = 1; attempt <= kAttempts && wait({}); ++attempt) {
     const auto reading = settle(angles);
     if (reading) {
       if (!wait(std::chrono::duration<double>(options_.settle_s))) return false;
@@ -182,6 +241,13 @@ bool Panorama::look_at(const PanTiltAngles& angles) {
     if (reading.error().code == ErrorCode::input) break;  // beyond its limits
   }
   return wait({});
+}
+
+// Cameras that cannot be triggered take frames by themselves.
+void Panorama::trigger(const std::set<std::string>& pairs) {
+  for (const std::string& pair : pairs) {
+    if (cameras_ != nullptr) static_cast<void>(cameras_->trigger(pair));
+  }
 }
 
 void Panorama::take_frames(const PanTiltAngles& angles) {
@@ -197,10 +263,7 @@ void Panorama::take_frames(const PanTiltAngles& angles) {
       const std::lock_guard lock(mutex_);
       missing = missing_;
     }
-    for (const std::string& pair : missing) {
-      // Cameras that cannot be triggered take frames by themselves.
-      if (cameras_ != nullptr) static_cast<void>(cameras_->trigger(pair));
-    }
+    trigger(missing);
     if (!wait_for_frames()) continue;
     // A frame that was triggered twice may come twice: the second one must not be taken for one at the next angles.
     set_phase(Phase::moving);
@@ -208,6 +271,7 @@ void Panorama::take_frames(const PanTiltAngles& angles) {
     return;
   }
   const std::lock_guard lock(mutex_);
+  if (missing_.empty()) return;  // it came after all
   hooks_.log.warning(
       fmt::format("panorama, pan {:.1f} deg: no frame of pair '{}'", angles.pan_rad / kDegree, *missing_.begin()));
 }
@@ -235,6 +299,8 @@ Result<StreamRead> PanoramaStream::read(std::chrono::nanoseconds timeout) {
     const auto left = until - std::chrono::steady_clock::now();
     auto read = behind().read(std::max<std::chrono::nanoseconds>(left, std::chrono::nanoseconds(0)));
     if (!read || !read->sample) return read;
+    auto* const missing = std::get_if<MissingFrame>(&*read->sample);
+    if (missing != nullptr && missing->partial && !panorama_.label(*missing->partial)) missing->partial.reset();
     auto* const frame = std::get_if<StereoFrame>(&*read->sample);
     if (frame == nullptr || panorama_.label(*frame)) return read;
   }

@@ -25,7 +25,9 @@ namespace spartan::internal {
 
 /// A panorama begins when it was requested, or the rover has driven PanoramaOptions::every_m since the last one, and as
 /// soon as the rover is stationary; it ends early where the rover drives on. A thread moves the unit, waits until it is
-/// still, and takes the frames; what goes wrong with one angle is logged, and the next one follows.
+/// still, and takes the frames; what goes wrong with one angle is logged, and the next one follows. At the end the unit
+/// returns to rest, as it does first of all where it is not there. Until it has returned no panorama begins, and the
+/// odometry's pair has no frames where it is on the unit, too; where it is not, kAttempts that fail are enough.
 class Panorama {
  public:
   using Clock = std::chrono::steady_clock;
@@ -50,27 +52,35 @@ class Panorama {
     update(motion.stamp);
   }
   /// Gives a frame its stop, and one of the unit's cameras its angles. False: it was not taken for a panorama, while
-  /// the unit moved, or, of the odometry's pair, during a panorama.
+  /// the unit moved, or, of the odometry's pair, during a panorama; one image is no view. Frames stay as they are until
+  /// the unit is first moved, where panoramas are taken by request() alone: the stream may have moved its cameras.
   bool label(StereoFrame& frame);
 
+  static constexpr int kAttempts = 3;        ///< of a motion, and of a frame
+  static constexpr double kPatience_s = 10;  ///< then it is logged why a panorama has not begun
+
  private:
-  enum class Phase { idle, moving, taking };
+  enum class Phase { idle, moving, taking, returning };
 
   Panorama(const Rig& rig, const std::string& odometry_pair, const PanoramaOptions& options, PanTiltControl& unit,
            CameraControl* cameras, const RunHooks& hooks);
   void update(Stamp stamp);
+  void explain_waiting(Stamp stamp, StationaryCheck::State state);
+  bool is_at_rest();
   void run();
   void report(bool begins);
   void take_all();
+  void return_to_rest();
   bool look_at(const PanTiltAngles& angles);
   Result<PanTiltReading> settle(const PanTiltAngles& angles);
   void take_frames(const PanTiltAngles& angles);
+  void trigger(const std::set<std::string>& pairs);
   void set_phase(Phase phase);
   bool wait(std::chrono::duration<double> time);
   /// Whether all are there, or the panorama ends.
   bool wait_for_frames();
   bool wait_in_stream(const std::function<bool()>& done);
-  bool ends() const { return ended_ || rover_moved_; }
+  bool ends() const { return ended_ || (rover_moved_ && phase_ != Phase::returning); }
 
   PanoramaOptions options_;
   PanTiltControl& unit_;
@@ -85,17 +95,21 @@ class Panorama {
   std::mutex mutex_;
   std::condition_variable changed_;
   Phase phase_ = Phase::idle;
+  bool untouched_ = false;  // the unit has not been moved, and the stream's frames are not changed
   bool requested_ = false, wanted_ = false, rover_moved_ = false, ended_ = false;
+  std::optional<Stamp> waits_since_;  // for the rover to be stationary
+  bool explained_ = false;
   double next_at_m_ = 0;
   std::int64_t position_id_ = -1;
   PanTiltAngles angles_;
-  std::set<std::string> missing_;  // pairs without a frame at these angles
+  std::set<std::string> missing_;              // pairs without a frame at these angles
   int views_ = 0;
   Stamp latest_;  // of all frames and sensor samples
   std::thread thread_;
 };
 
-/// A stream whose frames are labelled by a Panorama; those that it does not want are left out. Both are borrowed.
+/// A stream whose frames are labelled by a Panorama; those that it does not want are left out, the single image of a
+/// MissingFrame, too. Both are borrowed.
 class PanoramaStream : public StreamDecorator {
  public:
   PanoramaStream(SampleStream& stream, Panorama& panorama) : StreamDecorator(stream), panorama_(panorama) {}

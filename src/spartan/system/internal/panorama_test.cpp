@@ -1,35 +1,79 @@
 #include "spartan/system/internal/panorama.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <chrono>
+#include <functional>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <variant>
+#include <vector>
 
 namespace spartan::internal {
 namespace {
 
 using namespace std::chrono_literals;
+using ::testing::HasSubstr;
 
-// Is at once where it is sent.
-class QuickUnit : public PanTiltControl {
+constexpr PanTiltAngles kRest{0.1, 0.6};
+
+bool is_rest(const PanTiltAngles& angles) {
+  return angles.pan_rad == kRest.pan_rad && angles.tilt_rad == kRest.tilt_rad;
+}
+
+// Is where it is sent after so many readings.
+class ScriptedUnit : public PanTiltControl {
  public:
+  explicit ScriptedUnit(const PanTiltAngles& begin) : angles_(begin) {}
   Status move_to(const PanTiltAngles& angles) override {
+    {
+      const std::lock_guard lock(mutex_);
+      commands_.push_back(angles);
+    }
+    if (on_command) on_command(angles);
     const std::lock_guard lock(mutex_);
-    angles_ = angles;
+    int& refusals = is_rest(angles) ? refused_returns : refused_views;
+    if (refusals > 0) {
+      --refusals;
+      return failure(ErrorCode::read_error, "refuses");
+    }
+    target_ = angles;
+    readings_left_ = readings;
     return {};
   }
   Result<PanTiltReading> read() override {
     const std::lock_guard lock(mutex_);
-    return PanTiltReading{angles_, false};
+    if (target_ && readings_left_-- <= 0) {
+      angles_ = *target_;
+      target_.reset();
+    }
+    return PanTiltReading{angles_, target_.has_value()};
   }
   double sigma_rad() const override { return 0; }
+  bool rests() const {
+    const std::lock_guard lock(mutex_);
+    return !target_ && is_rest(angles_);
+  }
+  std::vector<PanTiltAngles> commands() const {
+    const std::lock_guard lock(mutex_);
+    return commands_;
+  }
+
+  std::function<void(const PanTiltAngles&)> on_command;
+  int readings = 0, refused_returns = 0, refused_views = 0;
 
  private:
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   PanTiltAngles angles_;
+  std::optional<PanTiltAngles> target_;
+  int readings_left_ = 0;
+  std::vector<PanTiltAngles> commands_;
 };
 
 // Both pairs are on the unit, which rests at 0.1 and 0.6 rad.
@@ -37,8 +81,8 @@ Rig rig_with_all_on_the_unit() {
   Rig rig;
   PanTiltUnit mast;
   mast.name = "mast";
-  mast.rest_pan_rad = 0.1;
-  mast.rest_tilt_rad = 0.6;
+  mast.rest_pan_rad = kRest.pan_rad;
+  mast.rest_tilt_rad = kRest.tilt_rad;
   rig.pan_tilt_units = {mast};
   for (const char* name : {"a", "b", "c", "d"}) {
     Camera camera;
@@ -57,29 +101,68 @@ StereoFrame frame_at_stop(const std::string& pair, double seconds) {
   return frame;
 }
 
-TEST(Panorama, TheOdometryOnTheUnitHasFramesBetweenPanoramas) {
-  QuickUnit unit;
-  std::atomic<int> begun = 0, ended = 0;
-  RunHooks hooks;
-  hooks.panorama = [&](const PanoramaEvent& event) { ++(event.begins ? begun : ended); };
+class PanoramaTest : public ::testing::Test {
+ protected:
+  PanoramaTest() {
+    options.settle_s = 0;
+    options.pans_deg = {-20, 20};
+    hooks.panorama = [this](const PanoramaEvent& event) { ++(event.begins ? begun : ended); };
+    hooks.log = Log::to_function([this](LogLevel, std::string_view text) { said += std::string(text) + "\n"; });
+  }
+  std::unique_ptr<Panorama> create(PanTiltControl& unit) {
+    return Panorama::create(rig_with_all_on_the_unit(), "narrow", options, unit, nullptr, hooks).value();
+  }
+  // The rover has been stationary for long enough.
+  static void rest_and_request(Panorama& panorama) {
+    panorama.request();
+    for (int i = 0; i < 20; ++i) panorama.add(RoverMotion{Stamp::from_seconds(0.1 * i), 0, Vector6d::Zero()});
+  }
+  static void drive_on(Panorama& panorama) {
+    Vector6d velocity = Vector6d::Zero();
+    velocity(0) = 0.2;
+    for (const double time_s : {2.0, 2.1}) panorama.add(RoverMotion{Stamp::from_seconds(time_s), 0, velocity});
+  }
+  // Until `done`, and not for ever.
+  template <class Done, class Step>
+  static void repeat_until(const Done& done, const Step& step) {
+    const auto until = std::chrono::steady_clock::now() + 60s;
+    for (double time_s = 3; !done() && std::chrono::steady_clock::now() < until; time_s += 0.001) {
+      step(time_s);
+      std::this_thread::sleep_for(1ms);
+    }
+  }
+  void wait_for_narrow_frames(Panorama& panorama) {
+    bool there = false;
+    repeat_until([&] { return there; },
+                 [&](double time_s) {
+                   StereoFrame narrow = frame_at_stop("narrow", time_s);
+                   there = panorama.label(narrow);
+                 });
+  }
+
   PanoramaOptions options;
-  options.settle_s = 0;
-  options.pans_deg = {-20, 20};
-  const auto panorama = Panorama::create(rig_with_all_on_the_unit(), "narrow", options, unit, nullptr, hooks).value();
+  RunHooks hooks;
+  std::atomic<int> begun = 0, ended = 0;
+  std::string said;
+};
+
+TEST_F(PanoramaTest, TheOdometryOnTheUnitHasFramesBetweenPanoramas) {
+  ScriptedUnit unit({0, 0});
+  const auto panorama = create(unit);
+  wait_for_narrow_frames(*panorama);
+  EXPECT_TRUE(unit.rests()) << "first of all it goes there";
   StereoFrame before = frame_at_stop("narrow", 0);
   EXPECT_TRUE(panorama->label(before));
   EXPECT_DOUBLE_EQ(before.pan_rad, 0.1);
   EXPECT_DOUBLE_EQ(before.tilt_rad, 0.6);
-  panorama->request();
-  for (int i = 0; i < 20; ++i) panorama->add(RoverMotion{Stamp::from_seconds(0.1 * i), 0, Vector6d::Zero()});
-  const auto until = std::chrono::steady_clock::now() + 20s;
+  rest_and_request(*panorama);
   int views = 0, during = 0;
-  for (double time_s = 2; ended == 0 && std::chrono::steady_clock::now() < until; time_s += 0.001) {
-    StereoFrame wide = frame_at_stop("wide", time_s), narrow = frame_at_stop("narrow", time_s);
-    views += panorama->label(wide) ? 1 : 0;
-    during += begun > ended && panorama->label(narrow) && narrow.position_id >= 0 ? 1 : 0;
-    std::this_thread::sleep_for(1ms);
-  }
+  repeat_until([&] { return ended > 0; },
+               [&](double time_s) {
+                 StereoFrame wide = frame_at_stop("wide", time_s), narrow = frame_at_stop("narrow", time_s);
+                 views += panorama->label(wide) ? 1 : 0;
+                 during += begun > ended && panorama->label(narrow) && narrow.position_id >= 0 ? 1 : 0;
+               });
   EXPECT_EQ(views, 2);
   EXPECT_EQ(during, 0) << "frames of a camera that turns, as if it did not";
   StereoFrame after = frame_at_stop("narrow", 100);
@@ -87,8 +170,125 @@ TEST(Panorama, TheOdometryOnTheUnitHasFramesBetweenPanoramas) {
   EXPECT_DOUBLE_EQ(after.pan_rad, 0.1);
 }
 
+// Six refusals are more than the attempts of one motion.
+TEST_F(PanoramaTest, TheReturnToRestIsAwaitedAndTriedAgain) {
+  ScriptedUnit unit({0, 0});
+  unit.readings = 3;
+  unit.refused_returns = 1;
+  unit.on_command = [&](const PanTiltAngles& angles) { unit.refused_returns += is_rest(angles) ? 0 : 3; };
+  const auto panorama = create(unit);
+  int wrong = 0, frames = 0;
+  const auto step = [&](double time_s) {
+    StereoFrame wide = frame_at_stop("wide", time_s), narrow = frame_at_stop("narrow", time_s);
+    panorama->label(wide);
+    const bool before = unit.rests(), labelled = panorama->label(narrow), after = unit.rests();
+    frames += labelled ? 1 : 0;
+    wrong += labelled && !before && !after ? 1 : 0;
+  };
+  repeat_until([&] { return frames > 0; }, step);
+  rest_and_request(*panorama);
+  repeat_until([&] { return ended > 0; }, step);
+  EXPECT_EQ(ended, 1);
+  EXPECT_TRUE(unit.rests());
+  EXPECT_EQ(wrong, 0) << "frames with the rest angles while the unit was elsewhere";
+  EXPECT_THAT(said, HasSubstr("the odometry waits until the pan-tilt unit has returned to rest"));
+  frames = 0;
+  repeat_until([&] { return frames > 0; }, step);
+  EXPECT_GT(frames, 0) << "the odometry goes on";
+}
+
+TEST_F(PanoramaTest, ACancelledOneCommandsNothingButTheReturn) {
+  for (const bool silent : {false, true}) {
+    ScriptedUnit unit(kRest);
+    unit.refused_views = silent ? 100 : 0;
+    options.tilts_deg = {10, 20};
+    std::unique_ptr<Panorama> panorama;
+    unit.on_command = [&](const PanTiltAngles& angles) {
+      if (!is_rest(angles)) drive_on(*panorama);
+    };
+    ended = 0;
+    panorama = create(unit);
+    rest_and_request(*panorama);
+    repeat_until([&] { return ended > 0; }, [](double) {});
+    const auto commands = unit.commands();
+    ASSERT_EQ(commands.size(), 2u);
+    EXPECT_FALSE(is_rest(commands[0]));
+    EXPECT_TRUE(is_rest(commands[1]));
+  }
+}
+
+// As those of a simulation, which has moved the unit by its own plan.
+TEST_F(PanoramaTest, FramesStayAsTheyAreUntilTheFirstOne) {
+  ScriptedUnit unit(kRest);
+  const auto panorama = create(unit);
+  StereoFrame planned = frame_at_stop("wide", 0);
+  planned.position_id = 7;
+  planned.pan_rad = 0.3;
+  EXPECT_TRUE(panorama->label(planned));
+  EXPECT_EQ(planned.position_id, 7);
+  EXPECT_EQ(planned.pan_rad, 0.3);
+  EXPECT_TRUE(unit.commands().empty());
+  rest_and_request(*panorama);
+  repeat_until([&] { return begun > 0; }, [](double) {});
+  StereoFrame narrow = frame_at_stop("narrow", 3);
+  EXPECT_FALSE(panorama->label(narrow));
+}
+
+TEST_F(PanoramaTest, SaysWhyItDoesNotBegin) {
+  ScriptedUnit unit(kRest);
+  const auto panorama = create(unit);
+  panorama->request();
+  for (int i = 0; i < 150; ++i) {
+    const Stamp stamp = Stamp::from_seconds(0.1 * i);
+    panorama->add(RoverMotion{stamp, 0, Vector6d::Zero()});
+    panorama->add(ImuSample{stamp, {0, 0, i % 2 == 0 ? 0.06 : -0.06}, {0, 0, 9.8}});
+  }
+  EXPECT_EQ(said, "a panorama has waited for 10 s for the rover to be stationary: the gyroscope shows that it moves\n");
+  EXPECT_EQ(begun, 0);
+}
+
+// Delivers one frame again and again, of which the right image is missing.
+class HalfFrames : public SampleStream {
+ public:
+  explicit HalfFrames(const std::string& pair) {
+    missing_.pair = pair;
+    missing_.fault = FrameFault::right_missing;
+    missing_.partial = frame_at_stop(pair, 0);
+    missing_.partial->left = FrameImage::own(Image<std::uint8_t>(4, 4), PixelFormat());
+  }
+  const StreamInfo& info() const override { return info_; }
+  Result<StreamRead> read(std::chrono::nanoseconds) override {
+    return StreamRead{StreamRead::State::sample, missing_, std::chrono::steady_clock::now()};
+  }
+  std::size_t previews(const std::string&) const override { return 0; }
+  Result<StereoFrame> preview(const std::string&, std::size_t) override { return failure(ErrorCode::input, "none"); }
+
+ private:
+  StreamInfo info_;
+  MissingFrame missing_;
+};
+
+TEST_F(PanoramaTest, AFrameOfOneImageHasTheAnglesToo) {
+  ScriptedUnit unit({0, 0});
+  const auto panorama = create(unit);
+  wait_for_narrow_frames(*panorama);
+  const auto partial_of = [&](const std::string& pair) {
+    HalfFrames half(pair);
+    PanoramaStream stream(half, *panorama);
+    return std::get<MissingFrame>(*stream.read({})->sample).partial;
+  };
+  const auto narrow = partial_of("narrow");
+  ASSERT_TRUE(narrow);
+  EXPECT_EQ(narrow->pan_rad, kRest.pan_rad);
+  EXPECT_FALSE(partial_of("wide")) << "no view";
+  unit.readings = 1'000'000;
+  rest_and_request(*panorama);
+  repeat_until([&] { return begun > 0; }, [](double) {});
+  EXPECT_FALSE(partial_of("narrow")) << "the unit moves";
+}
+
 TEST(Panorama, NeedsAPairBesidesTheOdometrys) {
-  QuickUnit unit;
+  ScriptedUnit unit(kRest);
   Rig rig = rig_with_all_on_the_unit();
   rig.pairs.pop_back();
   const auto panorama = Panorama::create(rig, "narrow", {}, unit, nullptr, {});
