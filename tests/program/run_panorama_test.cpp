@@ -196,6 +196,30 @@ TEST_F(RunPanorama, CommandsThatDoNotComeChangeNothing) {
   EXPECT_EQ(frames[0], frames[1]);
 }
 
+// The cameras of the simulation are on a unit that is less exact.
+class RoughSimulation : public StreamDecorator, public PanTiltControl {
+ public:
+  explicit RoughSimulation(LiveSimulation& simulation) : StreamDecorator(simulation), unit_(simulation) {}
+  PanTiltControl* pan_tilt() override { return this; }
+  Status move_to(const PanTiltAngles& angles) override { return unit_.move_to(angles); }
+  Result<StreamRead> read(std::chrono::nanoseconds timeout) override { return behind().read(timeout); }
+  Result<PanTiltReading> read() override { return unit_.read(); }
+  double sigma_rad() const override { return 0.2 * kDegree; }
+
+ private:
+  PanTiltControl& unit_;
+};
+
+TEST_F(RunPanorama, TheErrorOfTheStreamsOwnUnitEntersTheMaps) {
+  LiveSimulation simulation(small_request("stops_m: [0]"), 0, ThreadPool(1));
+  RoughSimulation stream(simulation);
+  RunRequest request = this->request();
+  request.max_frames = 1;
+  const auto outcome = run_live(stream, request, RunHooks());
+  ASSERT_TRUE(outcome) << outcome.error().message();
+  EXPECT_NEAR(stated_error_deg(), std::hypot(rig_error_deg(simulation.info().rig), 0.2), 1e-9);
+}
+
 TEST_F(RunPanorama, NeedsAUnit) {
   LiveSimulation simulation(small_request("stops_m: [0]"), 0, ThreadPool(1));
   const PanTiltEmulator emulator;

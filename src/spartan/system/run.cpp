@@ -350,11 +350,10 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   return outcome;
 }
 
-// Null where none is wanted. `unit`: null is that of the stream.
+// Null where none is wanted. `unit`: null where there is none.
 Result<std::unique_ptr<Panorama>> panorama_of(SampleStream& stream, PanTiltControl* unit, const RunRequest& request,
                                               const RunHooks& hooks) {
   const bool wanted = request.options.panorama.every_m > 0;
-  if (unit == nullptr) unit = stream.pan_tilt();
   if (unit == nullptr && wanted) {
     return failure(ErrorCode::usage, "has no pan-tilt unit, which a panorama needs", stream.info().path,
                    "name one with --pan-tilt");
@@ -368,6 +367,7 @@ Result<std::unique_ptr<Panorama>> panorama_of(SampleStream& stream, PanTiltContr
 
 // The error of the unit adds to that of its calibration in the variance of the maps.
 RunOptions with_unit_error(RunOptions options, const Rig& rig, const PanTiltControl& unit) {
+  if (!(unit.sigma_rad() > 0)) return options;
   double& pan_tilt_deg = options.mapping.map.calibration.pan_tilt_deg;
   if (pan_tilt_deg == CalibrationErrors().pan_tilt_deg && rig.calibration_errors)
     pan_tilt_deg = rig.calibration_errors->pan_tilt_deg;
@@ -406,11 +406,12 @@ Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, con
   RunRequest wanted = request;
   const StereoPair* const odometry = odometry_pair_of(stream.info().rig, request.options);
   try {
-    auto unit = request.pan_tilt.empty() ? std::unique_ptr<PanTiltControl>() : open_pan_tilt(request.pan_tilt);
-    if (!unit) return failure(unit);
-    if (*unit) wanted.options = with_unit_error(request.options, stream.info().rig, **unit);
+    auto named = request.pan_tilt.empty() ? std::unique_ptr<PanTiltControl>() : open_pan_tilt(request.pan_tilt);
+    if (!named) return failure(named);
+    PanTiltControl* const unit = *named ? named->get() : stream.pan_tilt();
+    if (unit != nullptr) wanted.options = with_unit_error(request.options, stream.info().rig, *unit);
     ContinuedStream continued(stream, hooks.log);
-    auto panorama = panorama_of(continued, unit->get(), wanted, hooks);
+    auto panorama = panorama_of(continued, unit, wanted, hooks);
     if (!panorama) return failure(panorama);
     std::optional<PanoramaStream> labelled;
     if (*panorama) labelled.emplace(continued, **panorama);
