@@ -119,6 +119,7 @@ class RunPanorama : public ::testing::Test {
 // The first by itself, the second on command.
 TEST_F(RunPanorama, IsTakenWhileTheRoverIsStationary) {
   LiveSimulation simulation(small_request("stops_m: [0], pan_period_s: 100"), 3, ThreadPool(1));
+  ASSERT_TRUE(simulation.set_exposure("wide", {20000, 1}));
   RunHooks hooks = this->hooks(4);
   bool asked = false;
   hooks.command = [&]() -> std::optional<RunCommand> {
@@ -139,6 +140,7 @@ TEST_F(RunPanorama, IsTakenWhileTheRoverIsStationary) {
   EXPECT_GT(events_[2].position_id, events_[0].position_id);
   const auto views = recorded_views();
   ASSERT_EQ(views.size(), 6u);
+  EXPECT_LT(views[0].exposure_us, 10000) << "controlled before the first view";
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_NEAR(views[i].pan_rad, (20.0 * static_cast<double>(i % 3) - 20) * kDegree, 1e-9);
     EXPECT_NEAR(views[i].tilt_rad, 65 * kDegree, 1e-6) << "the rest angle";

@@ -105,6 +105,21 @@ void Panorama::explain_waiting(Stamp stamp, StationaryCheck::State state) {
                                  reason_of(state)));
 }
 
+void Panorama::meter(const std::function<void(const StereoFrame&)>& measure) {
+  std::map<std::string, StereoFrame> frames;
+  {
+    const std::lock_guard lock(mutex_);
+    metered_ = true;
+    frames.swap(unused_);
+  }
+  for (const auto& [pair, frame] : frames) {
+    measure(frame);
+    const std::lock_guard lock(mutex_);
+    if (frame.position_id == position_id_) unmetered_.erase(pair);
+  }
+  if (!frames.empty()) changed_.notify_all();
+}
+
 bool Panorama::label(StereoFrame& frame) {
   const std::lock_guard lock(mutex_);
   latest_ = std::max(latest_, frame.left_stamp);
@@ -116,10 +131,17 @@ bool Panorama::label(StereoFrame& frame) {
     return phase_ == Phase::idle;
   }
   if (!pairs_.contains(frame.pair)) return true;
+  const PanTiltAngles& angles = phase_ == Phase::idle ? rest_ : angles_;
+  frame.pan_rad = angles.pan_rad;
+  frame.tilt_rad = angles.tilt_rad;
   const bool one_image = frame.left.empty() != frame.right.empty();
-  if (one_image || phase_ != Phase::taking || missing_.erase(frame.pair) == 0) return false;
-  frame.pan_rad = angles_.pan_rad;
-  frame.tilt_rad = angles_.tilt_rad;
+  const bool is_still = phase_ == Phase::idle || phase_ == Phase::taking;
+  if (one_image || !is_still) return false;
+  if (phase_ == Phase::idle || unmetered_.contains(frame.pair)) {
+    if (metered_) unused_[frame.pair] = frame;
+    return false;
+  }
+  if (missing_.erase(frame.pair) == 0) return false;
   ++views_;
   changed_.notify_all();
   return true;
@@ -232,6 +254,7 @@ bool Panorama::look_at(const PanTiltAngles& angles) {
     const auto reading = settle(angles);
     if (reading) {
       if (!wait(std::chrono::duration<double>(options_.settle_s))) return false;
+      meter_exposure(reading->angles);
       take_frames(reading->angles);
       return wait({});
     }
@@ -241,6 +264,25 @@ bool Panorama::look_at(const PanTiltAngles& angles) {
     if (reading.error().code == ErrorCode::input) break;  // beyond its limits
   }
   return wait({});
+}
+
+// Before the first view: the light was another one at the last panorama, and frames from the rest angles show another
+// ground.
+void Panorama::meter_exposure(const PanTiltAngles& angles) {
+  for (int i = 0; i < kMetered; ++i) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!metered_ || views_ > 0) return;
+      phase_ = Phase::taking;
+      angles_ = angles;
+      unmetered_ = pairs_;
+      missing_.clear();
+    }
+    trigger(pairs_);
+    if (!wait_in_stream([this] { return unmetered_.empty() || ends(); })) break;
+  }
+  const std::lock_guard lock(mutex_);
+  unmetered_.clear();
 }
 
 // Cameras that cannot be triggered take frames by themselves.

@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -44,6 +45,10 @@ class Panorama {
   Panorama& operator=(const Panorama&) = delete;
 
   void request();
+  /// For the exposure: the newest frame of each pair of the unit that is no view, from between panoramas or from the
+  /// first angles of one. From the first call on a panorama begins with kMetered frames for `measure` alone; in the
+  /// thread of add().
+  void meter(const std::function<void(const StereoFrame&)>& measure);
   /// Each frame of the odometry and each sample of these sensors, in one thread.
   template <class Motion>
   void add(const Motion& motion) {
@@ -57,6 +62,7 @@ class Panorama {
   bool label(StereoFrame& frame);
 
   static constexpr int kAttempts = 3;        ///< of a motion, and of a frame
+  static constexpr int kMetered = 2;         ///< frames of each pair
   static constexpr double kPatience_s = 10;  ///< then it is logged why a panorama has not begun
 
  private:
@@ -73,6 +79,7 @@ class Panorama {
   void return_to_rest();
   bool look_at(const PanTiltAngles& angles);
   Result<PanTiltReading> settle(const PanTiltAngles& angles);
+  void meter_exposure(const PanTiltAngles& angles);
   void take_frames(const PanTiltAngles& angles);
   void trigger(const std::set<std::string>& pairs);
   void set_phase(Phase phase);
@@ -103,6 +110,9 @@ class Panorama {
   std::int64_t position_id_ = -1;
   PanTiltAngles angles_;
   std::set<std::string> missing_;              // pairs without a frame at these angles
+  std::set<std::string> unmetered_;            // pairs whose exposure is not set for these angles
+  std::map<std::string, StereoFrame> unused_;  // for meter(), by pair
+  bool metered_ = false;                       // meter() is called
   int views_ = 0;
   Stamp latest_;  // of all frames and sensor samples
   std::thread thread_;

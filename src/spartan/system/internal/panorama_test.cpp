@@ -217,6 +217,30 @@ TEST_F(PanoramaTest, ACancelledOneCommandsNothingButTheReturn) {
   }
 }
 
+// The newest unused frame at rest, and two at the first angles of a panorama.
+TEST_F(PanoramaTest, TheExposureIsSetBeforeTheFirstView) {
+  ScriptedUnit unit({0, 0});
+  const auto panorama = create(unit);
+  wait_for_narrow_frames(*panorama);
+  int at_rest = 0, at_first = 0, at_second = 0, views = 0;
+  const auto step = [&](double time_s) {
+    panorama->meter([&](const StereoFrame& frame) {
+      EXPECT_EQ(frame.pair, "wide");
+      EXPECT_EQ(views, 0) << "not after the first view";
+      ++(frame.position_id < 0 ? at_rest : frame.pan_rad < 0 ? at_first : at_second);
+    });
+    StereoFrame wide = frame_at_stop("wide", time_s);
+    views += panorama->label(wide) ? 1 : 0;
+  };
+  repeat_until([&] { return at_rest > 3; }, step);
+  rest_and_request(*panorama);
+  repeat_until([&] { return begun > 0; }, [](double) {});
+  repeat_until([&] { return views == 2; }, step);
+  EXPECT_EQ(views, 2);
+  EXPECT_EQ(at_first, Panorama::kMetered);
+  EXPECT_EQ(at_second, 0);
+}
+
 // As those of a simulation, which has moved the unit by its own plan.
 TEST_F(PanoramaTest, FramesStayAsTheyAreUntilTheFirstOne) {
   ScriptedUnit unit(kRest);

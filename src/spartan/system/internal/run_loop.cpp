@@ -137,6 +137,7 @@ Status RunLoop::process_until_end() {
   while (request_.max_frames == 0 || frames_ < request_.max_frames) {
     // What a recorded run has computed since its last frame is stored with the next one, resumed or not.
     const bool can_stop = !recording_ || after_frame_;
+    meter_unused_frames();
     const bool wants_stop = (hooks_.should_stop && hooks_.should_stop()) || execute_commands();
     if (wants_stop && can_stop) {
       stopped_ = std::chrono::steady_clock::now();
@@ -206,6 +207,14 @@ bool RunLoop::execute_commands() {
     }
   }
   return false;
+}
+
+// Frames of the pan-tilt unit's cameras that are no views show how bright it is there.
+void RunLoop::meter_unused_frames() {
+  if (exposure_ == nullptr || panorama_ == nullptr || catching_up_) return;
+  panorama_->meter([this](const StereoFrame& frame) {
+    exposure_->update(frame, pipeline_.up_in_body(), pipeline_.body_velocity());
+  });
 }
 
 Status RunLoop::process(const Sample& sample) {

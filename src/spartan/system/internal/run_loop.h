@@ -91,6 +91,7 @@ class RunLoop {
   Status process(const Sample& sample);
   /// Whether the run is to end.
   bool execute_commands();
+  void meter_unused_frames();
   Status finish();
   /// `fault`: of the image that is missing; empty where both are there.
   Status process_frame(const StereoFrame& frame, std::string_view fault = {});
