@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -18,6 +19,7 @@ namespace {
 
 constexpr int kFirstBuffers = 8, kFewestFree = 3;
 constexpr unsigned kPacketWait_us = 60'000;
+constexpr std::size_t kMostSettings = 16;
 
 // An error of Aravis, freed at the end of its scope.
 class CameraError {
@@ -47,6 +49,12 @@ struct Token {
   ArvBuffer* buffer;
 };
 
+// What the camera takes images with, from some time on.
+struct Settings {
+  std::int64_t since_ns = 0;
+  double exposure_us = 0, gain = 1;
+};
+
 struct GenicamCamera {
   ~GenicamCamera();
   std::mutex mutex;  // of the camera's features, which Aravis does not guard
@@ -54,7 +62,8 @@ struct GenicamCamera {
   std::unique_ptr<ArvStream, Unref> stream;
   std::size_t payload = 0;
   std::atomic<bool> lost = false;
-  std::atomic<double> exposure_us = 0, gain = 1;
+  std::mutex settings_mutex;                     // not held while the camera is waited for
+  std::deque<Settings> settings = {Settings()};  // the newest one last
   SpartanExposureBounds bounds{};
   bool has_bounds = false;
 };
@@ -136,18 +145,37 @@ double decibel_of(double gain) {
   return std::round(20 * std::log10(gain) / kResolution_db) * kResolution_db;
 }
 
+std::int64_t now_ns() {
+  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
 // What the camera does not tell stays as it was.
 void read_exposure(GenicamCamera& device) {
   CameraError error;
+  Settings settings = device.settings.back();
   ArvCamera* const camera = device.camera.get();
   if (arv_camera_is_exposure_time_available(camera, nullptr)) {
     const double exposure_us = arv_camera_get_exposure_time(camera, error.out());
-    if (!error.is_set()) device.exposure_us = exposure_us;
+    if (!error.is_set()) settings.exposure_us = exposure_us;
   }
   if (arv_camera_is_gain_available(camera, nullptr)) {
     const double gain_db = arv_camera_get_gain(camera, error.out());
-    if (!error.is_set()) device.gain = factor_of(gain_db);
+    if (!error.is_set()) settings.gain = factor_of(gain_db);
   }
+  const std::lock_guard lock(device.settings_mutex);
+  settings.since_ns = now_ns();
+  device.settings.push_back(settings);
+  if (device.settings.size() > kMostSettings) device.settings.pop_front();
+}
+
+// Of an image whose first packet was here at this time, so that its exposure had ended: those that were set before its
+// exposure began.
+Settings settings_at(GenicamCamera& device, std::int64_t received_ns) {
+  const std::lock_guard lock(device.settings_mutex);
+  const auto found = std::find_if(device.settings.rbegin(), device.settings.rend(), [&](const Settings& settings) {
+    return settings.since_ns <= received_ns - std::llround(1e3 * settings.exposure_us);
+  });
+  return found == device.settings.rend() ? device.settings.front() : *found;
 }
 
 void read_bounds(GenicamCamera& device) {
@@ -193,16 +221,17 @@ bool start(GenicamCamera& device, const SpartanCameraSettings& settings, std::st
 std::int64_t received_ns(ArvBuffer* buffer) {
   const auto received = static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer));
   const std::int64_t age_ns = std::max<std::int64_t>(0, g_get_real_time() * 1000 - received);
-  return std::chrono::steady_clock::now().time_since_epoch() / std::chrono::nanoseconds(1) - age_ns;
+  return now_ns() - age_ns;
 }
 
-void describe(const GenicamCamera& device, ArvBuffer* buffer, SpartanCameraImage& image) {
+void describe(GenicamCamera& device, ArvBuffer* buffer, SpartanCameraImage& image) {
   image = {};
   image.frame_id = static_cast<std::int64_t>(arv_buffer_get_frame_id(buffer));
   image.camera_ns = static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer));
   image.received_ns = received_ns(buffer);
-  image.exposure_us = device.exposure_us;
-  image.gain = device.gain;
+  const Settings settings = settings_at(device, image.received_ns);
+  image.exposure_us = settings.exposure_us;
+  image.gain = settings.gain;
   if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS) {
     // What is known of an image without its first packet is not of this image.
     if (image.camera_ns <= 0) image.camera_ns = -1;

@@ -105,8 +105,9 @@ struct ExposureBounds {
 /// The part of `wanted` that is possible; where no part is, the possible settings that are nearest.
 ExposureBounds limit(const ExposureBounds& wanted, const ExposureBounds& possible);
 
-/// Settings of cameras that run now. A setting applies to images whose exposure begins after the call; frames state
-/// what they were taken with. Can be called while another thread reads the stream.
+/// Settings of cameras that run now. A setting applies to images whose exposure begins after the call, or to later
+/// ones; frames state what they were taken with, as far as it is known. Can be called while another thread reads the
+/// stream.
 class CameraControl {
  public:
   virtual ~CameraControl() = default;

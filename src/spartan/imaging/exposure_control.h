@@ -89,7 +89,7 @@ class GroundMeter {
 
 /// Settings that bring the ground of the next image to its level. The product of exposure time and gain follows from
 /// that of the measured frame itself, so frames that are still on their way when a setting changes do not make it
-/// oscillate.
+/// oscillate. It relies on the settings that are stated for a frame: where they are later ones, it does.
 class ExposureControl {
  public:
   explicit ExposureControl(const ExposureOptions& options) : options_(options) {}

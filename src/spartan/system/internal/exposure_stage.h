@@ -12,6 +12,7 @@
 #include "spartan/core/result.h"
 #include "spartan/imaging/exposure_control.h"
 #include "spartan/rig/rig.h"
+#include "spartan/system/internal/exposure_lag.h"
 
 namespace spartan::internal {
 
@@ -40,12 +41,15 @@ class ExposureStage {
   ExposureStage(const Rig& rig, const ExposureOptions& options, CameraControl& control, const Log& log)
       : rig_(rig), options_(options), exposure_(options), control_(control), log_(log) {}
 
+  ExposureSettings taken_with(const std::string& pair, const GroundBrightness& ground, const ExposureSettings& stated);
+
   Rig rig_;
   ExposureOptions options_;
   ExposureControl exposure_;
   CameraControl& control_;
   Log log_;
   std::map<std::string, GroundMeter> meters_;  // of each pair
+  std::map<std::string, ExposureLag> lags_;
   ExposureStatistics statistics_;
   bool refused_ = false;
 };
