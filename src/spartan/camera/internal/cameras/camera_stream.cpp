@@ -13,10 +13,10 @@ using Clock = std::chrono::steady_clock;
 
 // From the start of the threads to the first trigger.
 constexpr std::chrono::milliseconds kFirstTrigger{50};
-// A camera without an image for so long, and whose partner has delivered so many alone, is silent.
+// A camera without an image for so long, while its partner has delivered more than so many, is silent.
 constexpr std::chrono::milliseconds kAskToStop{100};
 constexpr std::chrono::seconds kSilence{1};
-constexpr int kAloneInRow = 3;
+constexpr int kAlone = 3;
 
 bool has_driver(const Rig& rig, const std::string& camera) {
   return rig.find_camera(camera)->driver.has_value();
@@ -108,6 +108,8 @@ void CameraStream::add(Feed& feed, int side, StampedImage image) {
     ++feed.report.not_taken;
   }
   feed.newest[side == 0 ? 0 : 1] = image.image.complete;
+  feed.behind[side == 0 ? 0 : 1] = 0;
+  ++feed.behind[side == 0 ? 1 : 0];
   feed.pairing.add(side, std::move(image));
   changed_.notify_all();
 }
@@ -226,13 +228,16 @@ void CameraStream::take_all(Clock::time_point now) {
   changed_.notify_all();
 }
 
-// Whether one of the cameras no longer delivers, so that its images are not waited for.
-bool CameraStream::is_one_camera_silent(const Feed& feed, Clock::time_point now) {
+// Whether one of the cameras no longer delivers, so that its images are not waited for. One that was lost is waited for
+// from the first image of its partner after its return.
+bool CameraStream::is_one_camera_silent(Feed& feed, Clock::time_point now) {
   const bool lost =
       std::any_of(feed.sources.begin(), feed.sources.end(), [](const auto& source) { return source->is_lost(); });
-  const bool silent = std::any_of(feed.newest.begin(), feed.newest.end(),
-                                  [&](Clock::time_point newest) { return now - newest > kSilence; });
-  return lost || (silent && feed.alone_in_row >= kAloneInRow);
+  if (lost) feed.behind = {};
+  bool silent = lost;
+  for (std::size_t side = 0; side < 2; ++side)
+    silent = silent || (feed.behind[side] > kAlone && now - feed.newest[side] > kSilence);
+  return silent;
 }
 
 bool CameraStream::waits() const {
@@ -242,7 +247,6 @@ bool CameraStream::waits() const {
 }
 
 void CameraStream::take_pair(Feed& feed, const ImagePair& pair) {
-  feed.alone_in_row = pair.is_complete() ? 0 : feed.alone_in_row + 1;
   Clock::time_point complete = pair.first().image.complete;
   if (pair.is_complete()) complete = std::max(complete, pair.images[1]->image.complete);
   push(sample_of(feed, pair), complete);

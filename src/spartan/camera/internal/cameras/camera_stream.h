@@ -66,7 +66,7 @@ class CameraStream : public SampleStream, public CameraControl {
     bool waits = false;  // as the first source
     ImagePairing pairing;
     std::array<std::chrono::steady_clock::time_point, 2> newest;  // images, by side
-    int alone_in_row = 0;                                         // images, the newest ones
+    std::array<int, 2> behind{};  // images of the other side since the newest one of this side
     std::optional<Stamp> last_stamp;
     CameraPairReport report;
     double skew_sum_ms = 0;
@@ -77,7 +77,7 @@ class CameraStream : public SampleStream, public CameraControl {
   Status open_pair(const StereoPair& pair, const OpenDevice& open);
   void start();
   void add(Feed& feed, int side, StampedImage image);
-  static bool is_one_camera_silent(const Feed& feed, std::chrono::steady_clock::time_point now);
+  static bool is_one_camera_silent(Feed& feed, std::chrono::steady_clock::time_point now);
   void take_all(std::chrono::steady_clock::time_point now);
   void take_pair(Feed& feed, const ImagePair& pair);
   Sample sample_of(Feed& feed, const ImagePair& pair);

@@ -113,7 +113,7 @@ class CameraStreamTest : public ::testing::Test {
     info.rig = rig;
     info.path = "test:";
     CameraStreamOptions options;
-    options.pair_wait = milliseconds(100);
+    options.pair_wait = pair_wait;
     options.first_wait = first_wait;
     options.should_stop = should_stop;
     return CameraStream::create(
@@ -151,7 +151,7 @@ class CameraStreamTest : public ::testing::Test {
   std::map<std::string, Script> scripts;
   Script &left_script = scripts["left"], &right_script = scripts["right"];
   std::vector<std::string> said;
-  milliseconds first_wait{500};
+  milliseconds first_wait{500}, pair_wait{100};
   std::function<bool()> should_stop;
 };
 
@@ -387,6 +387,36 @@ TEST_F(CameraStreamTest, ASilentCameraIsNotWaitedForUntilItDeliversAgain) {
   scripts["right"].add(image_read(16, 2));
   EXPECT_EQ(std::get<MissingFrame>(next(**stream)).fault, FrameFault::left_missing);
   deliver(17);
+  EXPECT_TRUE(std::holds_alternative<StereoFrame>(next(**stream)));
+}
+
+// A pair that is triggered every 1.5 s, of which the right camera was away for some images.
+TEST_F(CameraStreamTest, SlowCamerasArePairedAgain) {
+  pair_wait = std::chrono::seconds(20);
+  const auto start = Clock::now() - std::chrono::seconds(60);
+  const auto add = [&](const char* name, int id, Clock::time_point time, bool waits = false) {
+    DeviceRead read = image_read(id, 1);
+    read.image.began = time;
+    if (!waits) read.image.complete = time;
+    read.image.camera_ns = time.time_since_epoch() / std::chrono::nanoseconds(1);
+    scripts[name].add(read);
+  };
+  const auto time_of = [&](int id) { return start + milliseconds(1500) * id; };
+  add("left", 1, time_of(1), true);
+  add("right", 1, time_of(1), true);
+  auto stream = open(two_cameras());
+  ASSERT_TRUE(stream) << stream.error().message();
+  static_cast<void>((*stream)->read(milliseconds(1)));
+  for (int id = 2; id < 7; ++id) {
+    add("left", id, time_of(id));
+    EXPECT_EQ(std::get<MissingFrame>(next(**stream)).fault, FrameFault::right_missing);
+  }
+  add("right", 7, time_of(7));
+  EXPECT_EQ(std::get<MissingFrame>(next(**stream)).fault, FrameFault::left_missing);
+  const auto now = Clock::now();
+  add("left", 8, now);
+  EXPECT_EQ((*stream)->read(milliseconds(50))->state, StreamRead::State::none_yet) << "the right one will come";
+  add("right", 8, now);
   EXPECT_TRUE(std::holds_alternative<StereoFrame>(next(**stream)));
 }
 
