@@ -31,10 +31,38 @@ double CameraClock::delay_of(const Point& point) const {
   return seconds_of(point.host_ns - origin_.host_ns) - camera_s - rate_minus_1_ * camera_s - offset_s_;
 }
 
+double CameraClock::tolerance_s() const {
+  return std::max(kLeastTolerance_s, 5 * (scatter_s_ + typical_delay_s_ + first_sigma_s_));
+}
+
 bool CameraClock::is_wrong(const Point& point) const {
   if (bins_.empty()) return false;
-  const double tolerance_s = std::max(kLeastTolerance_s, 5 * (scatter_s_ + typical_delay_s_ + first_sigma_s_));
-  return point.camera_ns <= *last_camera_ns_ || delay_of(point) < -tolerance_s;
+  return point.camera_ns <= *last_camera_ns_ || delay_of(point) < -tolerance_s();
+}
+
+// Of a point that is not wrong.
+bool CameraClock::was_set_back(const Point& point) {
+  if (bins_.empty() || delay_of(point) <= tolerance_s()) {
+    late_.clear();
+    return false;
+  }
+  late_.push_back(point);
+  if (late_.size() > kLateInRow && seconds_of(point.host_ns - late_[1].host_ns) >= kLate_s) late_.pop_front();
+  if (late_.size() < kLateInRow || seconds_of(point.host_ns - late_.front().host_ns) < kLate_s) return false;
+  // The earliest arrivals of both halves are as late.
+  const auto least_s = [this](auto from, auto to) {
+    return delay_of(
+        *std::min_element(from, to, [this](const Point& a, const Point& b) { return delay_of(a) < delay_of(b); }));
+  };
+  const auto middle = late_.begin() + static_cast<std::ptrdiff_t>(late_.size() / 2);
+  return std::abs(least_s(late_.begin(), middle) - least_s(middle, late_.end())) < tolerance_s();
+}
+
+void CameraClock::start_again(std::deque<Point>& points) {
+  ++restarts_;
+  bins_.clear();
+  for (const Point& point : points) insert(point);
+  points.clear();
 }
 
 MappedStamp CameraClock::add(std::int64_t camera_ns, Stamp noticed) {
@@ -44,13 +72,11 @@ MappedStamp CameraClock::add(std::int64_t camera_ns, Stamp noticed) {
     if (!agrees(point)) refused_.clear();
     refused_.push_back(point);
     if (refused_.size() < kRestarts) return mapped;
-    ++restarts_;
-    bins_.clear();
-    for (const Point& refused : refused_) insert(refused);
-    refused_.clear();
+    late_.clear();
+    start_again(refused_);
   } else {
     refused_.clear();
-    insert(point);
+    was_set_back(point) ? start_again(late_) : insert(point);
   }
   const double host_s = seconds_of(point.host_ns - origin_.host_ns) - delay_of(point);
   return {Stamp{origin_.host_ns + static_cast<std::int64_t>(std::llround(host_s * 1e9))}, sigma_s_, true};

@@ -25,7 +25,9 @@ struct MappedStamp {
 /// Newman: "TICSync", ICRA 2011), which one wrong stamp would spoil.
 ///
 /// A stamp is wrong where it does not increase, or the image would have been much less late than all before. Where
-/// kRestarts of them agree with each other, the camera has set its clock, and the fit starts again with them.
+/// kRestarts of them agree with each other, the camera has set its clock, and the fit starts again with them. It does
+/// also where kLateInRow images in a row, over kLate_s at least, were much later than the line and all by as much: the
+/// camera has set its clock back. Those that waited together for a busy computer differ in how late they are.
 class CameraClock {
  public:
   /// Of images in order of arrival. `camera_ns`: stamp of the camera; `noticed`: when the host had it.
@@ -39,7 +41,8 @@ class CameraClock {
   static constexpr double kLeastSpan_s = 10;         ///< of the fit of a rate; a shorter one takes 1
   static constexpr double kLargestRate = 5e-4;       ///< of rate() − 1; that of a crystal is a tenth
   static constexpr double kLeastTolerance_s = 0.02;  ///< by which an arrival may be earlier than all before
-  static constexpr std::size_t kRestarts = 3;
+  static constexpr std::size_t kRestarts = 3, kLateInRow = 15;
+  static constexpr double kLate_s = 1;
   static constexpr double kFirstSigma_s = 0.03;  ///< of the smallest delay by one arrival; of more, over their number
 
  private:
@@ -54,7 +57,10 @@ class CameraClock {
   };
 
   double delay_of(const Point& point) const;
+  double tolerance_s() const;
   bool is_wrong(const Point& point) const;
+  bool was_set_back(const Point& point);
+  void start_again(std::deque<Point>& points);
   MappedStamp without_clock(const Point& point) const;
   bool agrees(const Point& point) const;
   void restart(const Point& point);
@@ -64,6 +70,7 @@ class CameraClock {
 
   std::deque<Bin> bins_;
   std::deque<Point> refused_;  // the newest wrong ones, one after the other
+  std::deque<Point> late_;     // the newest ones, much later than the line
   std::optional<std::int64_t> last_camera_ns_;
   Point origin_;  // of the line
   double offset_s_ = 0, rate_minus_1_ = 0;

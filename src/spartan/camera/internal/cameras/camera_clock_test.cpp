@@ -137,5 +137,44 @@ TEST(CameraClock, ACameraThatSetsItsClockIsFollowed) {
   }
 }
 
+// By half an interval to two: the stamps still increase, or do again with the next image.
+TEST(CameraClock, ASmallStepOfTheClockIsFollowed) {
+  for (const double intervals : {-2.0, -1.5, -1.0, -0.5, 0.5, 1.0, 2.0}) {
+    for (const auto& delay : {late_by_exponential, late_by_normal}) {
+      FakeClock camera(5);
+      CameraClock clock;
+      for (int i = 0; i < 600; ++i) {
+        auto image = camera.next(delay);
+        if (i >= 300) image.camera_ns += std::llround(intervals * 1e8);
+        const MappedStamp mapped = clock.add(image.camera_ns, image.noticed);
+        if (i >= 30 && (i < 300 || i >= 320)) {
+          EXPECT_LT(std::abs(seconds_between(image.taken, mapped.host)), 0.03) << intervals << " intervals, " << i;
+        }
+      }
+      EXPECT_EQ(clock.restarts(), 1) << intervals << " intervals";
+    }
+  }
+}
+
+// The images of a second or three arrive together, at 10 and at 100 Hz.
+TEST(CameraClock, ABurstOfLateArrivalsIsNoStepOfTheClock) {
+  for (const double period_s : {0.1, 0.01}) {
+    for (const double stall_s : {1.0, 3.0}) {
+      CameraClock clock;
+      std::mt19937_64 random(6);
+      for (int i = 0; i < 3000; ++i) {
+        const double taken_s = period_s * i, stall_begin_s = 1000 * period_s;
+        double noticed_s = taken_s + 0.002 + std::exponential_distribution<double>(1 / 0.0005)(random);
+        if (taken_s > stall_begin_s) noticed_s = std::max(noticed_s, stall_begin_s + stall_s + 1e-4 * (i - 1000));
+        const MappedStamp mapped = clock.add(std::llround(taken_s * 1e9) + 5, Stamp::from_seconds(1000 + noticed_s));
+        if (i > 100) {
+          EXPECT_LT(std::abs(seconds_between(Stamp::from_seconds(1000 + taken_s), mapped.host)), 0.005) << i;
+        }
+      }
+      EXPECT_EQ(clock.restarts(), 0);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace spartan::internal
