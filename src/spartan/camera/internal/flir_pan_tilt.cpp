@@ -151,6 +151,11 @@ Result<double> FlirPanTilt::query(const std::string& text) {
 }
 
 Status FlirPanTilt::connect() {
+  if (!line_.is_open()) {
+    auto again = SerialLine::open(line_.device(), baud_);
+    if (!again) return failure(again);
+    line_ = std::move(*again);
+  }
   // The end of a command that was interrupted.
   if (Status written = line_.write(" "); !written) return written;
   for (const char* setting : {"ED", "FT", "I"}) {  // no echo, terse answers, motions begin at once

@@ -23,7 +23,8 @@ Result<FlirAddress> parse_flir_address(const std::string& text);
 /// The ASCII protocol of the PTU-46, the D and the E series (FLIR, "E Series Pan-Tilt Command Reference Manual"): a
 /// command is a name, a number and a delimiter, `PP-2500 `; the answer is a line `*`, a query's `* 22`, a refused one's
 /// `! message`. A position is a whole number of steps, whose size the unit states in seconds of arc. Lines that are no
-/// answers are ignored; where no answer comes, a command is sent again.
+/// answers are ignored; where no answer comes, a command is sent again. A line that was unplugged is opened again by
+/// the next motion.
 ///
 /// The end of a motion is found by reading the positions (`PP`, `TP`), not by the await command `A`: that one is
 /// answered at the end of the motion only, so that a unit which moves for seconds could not be told from one that is
@@ -52,6 +53,7 @@ class FlirPanTilt : public PanTiltControl {
 
   FlirPanTilt(SerialLine line, const FlirAddress& address)
       : line_(std::move(line)),
+        baud_(address.baud),
         axes_{Axis{'P', address.pan_sign, address.pan_deg_s, 0, 0, 0, 0},
               Axis{'T', address.tilt_sign, address.tilt_deg_s, 0, 0, 0, 0}} {}
 
@@ -64,6 +66,7 @@ class FlirPanTilt : public PanTiltControl {
   Result<long> position_of(const Axis& axis, double angle_rad) const;
 
   SerialLine line_;
+  int baud_;
   std::array<Axis, 2> axes_;
   bool connected_ = false;
 };

@@ -5,12 +5,14 @@
 
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <numbers>
 #include <string>
 #include <thread>
 
 #include "spartan/testing/pan_tilt_emulator.h"
+#include "spartan/testing/temporary_folder.h"
 
 namespace spartan::internal {
 namespace {
@@ -185,6 +187,29 @@ TEST(FlirPanTilt, AnUnpluggedLineIsAnError) {
   const auto reading = unit->read();
   ASSERT_FALSE(reading);
   EXPECT_EQ(reading.error().code, ErrorCode::read_error);
+}
+
+// As an adapter of USB that comes back under the same name of /dev/serial/by-id, and is another device.
+TEST(FlirPanTilt, ALineThatWasUnpluggedIsOpenedAgain) {
+  const testing::TemporaryFolder folder;
+  const std::string name = folder.path() + "/unit";
+  auto first = std::make_unique<PanTiltEmulator>();
+  std::filesystem::create_symlink(first->device(), name);
+  const auto unit = open_pan_tilt("flir:" + name + "?pan_deg_s=50");
+  ASSERT_TRUE(unit) << unit.error().message();
+  const PanTiltEmulator second;
+  first.reset();
+  EXPECT_FALSE((*unit)->read());
+  std::filesystem::remove(name);
+  EXPECT_EQ((*unit)->move_to({0.2, 0.1}).error().code, ErrorCode::read_error) << "not there yet";
+  EXPECT_FALSE((*unit)->read());
+  std::filesystem::create_symlink(second.device(), name);
+  const Status moved = (*unit)->move_to({0.2, 0.1});
+  ASSERT_TRUE(moved) << moved.error().message();
+  const auto reading = settle(**unit);
+  ASSERT_TRUE(reading) << reading.error().message();
+  EXPECT_NEAR(reading->angles.pan_rad, 0.2, kStep_rad);
+  EXPECT_NEAR(second.speed('P') * kStep_rad, 50 * kDegree, kStep_rad);
 }
 
 TEST(PanTilt, AddressesAreChecked) {

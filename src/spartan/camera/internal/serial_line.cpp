@@ -79,7 +79,17 @@ SerialLine& SerialLine::operator=(SerialLine&& other) noexcept {
 }
 
 SerialLine::~SerialLine() {
-  if (file_ >= 0) ::close(file_);
+  close();
+}
+
+void SerialLine::close() {
+  if (file_ >= 0) ::close(std::exchange(file_, -1));
+}
+
+tl::unexpected<Error> SerialLine::lost(const std::string& what) {
+  auto error = system_error(what, device_);
+  close();
+  return tl::unexpected(std::move(error));
 }
 
 Status SerialLine::write(const std::string& text) {
@@ -91,7 +101,7 @@ Status SerialLine::write(const std::string& text) {
       continue;
     }
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0 && errno != EAGAIN) return tl::unexpected(system_error("cannot be written", device_));
+    if (n < 0 && errno != EAGAIN) return lost("cannot be written");
     pollfd ready{file_, POLLOUT, 0};
     if (::poll(&ready, 1, 1000) == 0)
       return failure(ErrorCode::read_error, "takes no characters for a second", device_);
@@ -114,7 +124,7 @@ Result<std::optional<std::string>> SerialLine::read_line(std::chrono::millisecon
     if (n > 0) {
       received_.append(bytes.data(), static_cast<std::size_t>(n));
     } else if (n == 0 || (errno != EAGAIN && errno != EINTR)) {
-      return tl::unexpected(system_error("cannot be read; was it unplugged?", device_));
+      return lost("cannot be read; was it unplugged?");
     }
   }
 }

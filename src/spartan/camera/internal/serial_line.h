@@ -9,7 +9,8 @@
 
 namespace spartan::internal {
 
-/// A terminal device in raw mode, 8 data bits, no parity, 1 stop bit.
+/// A terminal device in raw mode, 8 data bits, no parity, 1 stop bit. It closes where it cannot be read or written, as
+/// after it was unplugged.
 class SerialLine {
  public:
   /// Codes: `usage` (no such rate), `read_error` (no such device).
@@ -21,6 +22,8 @@ class SerialLine {
   ~SerialLine();
 
   const std::string& device() const { return device_; }
+  bool is_open() const { return file_ >= 0; }
+  void close();
   Status write(const std::string& text);
   /// The next line without its end (CR or LF); empty lines are skipped. Nothing where none ends before the timeout.
   /// Characters that are not printable are left out, and of a line longer than kLongestLine the begin.
@@ -32,6 +35,7 @@ class SerialLine {
 
  private:
   SerialLine(std::string device, int file) : device_(std::move(device)), file_(file) {}
+  tl::unexpected<Error> lost(const std::string& what);
 
   std::string device_;
   int file_ = -1;
