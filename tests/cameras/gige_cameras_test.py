@@ -105,6 +105,7 @@ class LiveRun:
         rig = rig_with_drivers(arguments.spartan, arguments.recording, folder)
         command = [arguments.spartan, "run", f"live:{rig}", "-o", str(self.out), "--threads", "1",
                    "--publish", "-", "--set", "maps=false", "--set", "terrain.enabled=false", *options]
+        self.began, self.first_pose = time.monotonic(), None
         with open(self.log, "w", encoding="utf-8") as text:
             self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=text, text=True)
 
@@ -114,7 +115,10 @@ class LiveRun:
         while count > 0 or time.monotonic() < end:
             line = self.process.stdout.readline()
             assert line, f"the run has ended:\n{self.log.read_text()}"
-            count -= '"type":"pose"' in line.replace(" ", "")
+            is_pose = '"type":"pose"' in line.replace(" ", "")
+            if is_pose and self.first_pose is None:
+                self.first_pose = time.monotonic()
+            count -= is_pose
 
     def wait_for_words(self, words):
         """Waits until the log has them; the poses go on meanwhile."""
@@ -122,10 +126,12 @@ class LiveRun:
             self.wait_for_poses(1)
 
     def end(self):
-        """The summary, and what was said."""
+        """The summary, and what was said. Every image must be accounted for."""
         self.process.send_signal(signal.SIGINT)
         self.process.communicate(timeout=120)
-        return json.loads((self.out / "summary.json").read_text()), self.log.read_text()
+        summary = json.loads((self.out / "summary.json").read_text())
+        check_accounts(summary, RATE_HZ * (self.first_pose - self.began))
+        return summary, self.log.read_text()
 
 
 def live_run(arguments, lost=0.0, unplugged=False):
@@ -144,23 +150,31 @@ def live_run(arguments, lost=0.0, unplugged=False):
             return run.end()
 
 
-def check_accounts(summary):
-    """Every trigger is a pair, or is accounted for."""
+def check_accounts(summary, most_before):
+    """Every trigger is an image, and every image is in a frame, or is accounted for. Those that came before the run read
+    its first frame, at most `most_before` of each camera, are in no frame."""
     pair = summary["live"]["cameras"][0]
-    for camera in pair["cameras"]:
-        print(json.dumps(camera))
-        open_triggers = (camera["triggers"] + camera["untriggered"] - camera["images"] - camera["incomplete"]
-                         - camera["unanswered"])
-        assert 0 <= open_triggers <= 2 * RATE_HZ, f"{open_triggers} triggers of {camera['camera']} are not accounted for"
     print(json.dumps({key: value for key, value in pair.items() if key != "cameras"}))
     print(json.dumps({"frames": summary["frames"], "latency_ms": summary["live"]["latency_ms"],
                       "dropped": summary["live"]["dropped"]}))
-    return pair
+    waiting = 3  # at the end: for the other image, or to be taken
+    rests = []
+    for side, camera in zip(("left", "right"), pair["cameras"]):
+        print(json.dumps(camera))
+        delivered = camera["images"] + camera["incomplete"]
+        open_triggers = camera["triggers"] + camera["untriggered"] - delivered - camera["unanswered"]
+        assert 0 <= open_triggers <= 2 * RATE_HZ, f"{open_triggers} triggers of {camera['camera']} are not accounted for"
+        both = sum(pair[key] for key in ("frames", "incomplete", "wrong_size", "apart", "stamps_reversed"))
+        rests.append(delivered - both - pair[f"{side}_alone"])
+        print(f"{rests[-1]} images of {camera['camera']} in no frame, at most {most_before:.0f} of them before the first one")
+        assert 0 <= rests[-1] <= most_before + pair["not_taken"] + waiting, f"images of {camera['camera']} are lost"
+    # Before the first frame, too, the cameras answer the same triggers.
+    assert abs(rests[0] - rests[1]) <= pair["not_taken"] + waiting, f"images of one camera are lost: {rests}"
 
 
 def case_plain(arguments):
     summary, _ = live_run(arguments)
-    pair = check_accounts(summary)
+    pair = summary["live"]["cameras"][0]
     assert pair["frames"] > POSES / 2
     odometry = summary["health"]["odometry"]
     # At two triggers the drive may show the same moment; black images would be lost in all frames.
@@ -170,14 +184,14 @@ def case_plain(arguments):
 
 def case_lost_packets(arguments):
     summary, said = live_run(arguments, lost=arguments.lost)
-    pair = check_accounts(summary)
+    pair = summary["live"]["cameras"][0]
     assert sum(camera["incomplete"] for camera in pair["cameras"]) > 0, "no packet was lost"
     assert pair["frames"] > 0, said
 
 
 def case_unplugged(arguments):
     summary, said = live_run(arguments, unplugged=True)
-    pair = check_accounts(summary)
+    pair = summary["live"]["cameras"][0]
     assert pair["cameras"][1]["losses"] == 1, said
     assert pair["left_alone"] > 0, "frames with the left image only"
     assert pair["frames"] > POSES, "frames with both images, before and after"
