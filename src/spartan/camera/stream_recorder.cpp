@@ -152,7 +152,7 @@ void StreamRecorder::State::run() {
 }
 
 Status StreamRecorder::State::write_counted(const Sample& sample) {
-  const Status status = write(sample);
+  Status status = write(sample);
   const bool is_frame = std::holds_alternative<StereoFrame>(sample) || std::holds_alternative<MissingFrame>(sample);
   const std::lock_guard lock(mutex);
   if (status) {
