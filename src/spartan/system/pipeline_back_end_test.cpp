@@ -145,6 +145,7 @@ TEST(PipelineBackEnd, DenseOdometryContinuesFromRestoredState) {
   options.maps = false;
   options.odometry.reconstruction.source = DisparitySource::dense;
   std::vector<StereoFrame> frames;
+  frames.reserve(kImages);
   for (int i = 0; i < kImages; ++i) frames.push_back(view_at("narrow", i, i, 3.0 * i));
   Pipeline uninterrupted = Pipeline::create(mapping_rover(), options, ThreadPool(1)).value();
   std::vector<Bytes> states;
