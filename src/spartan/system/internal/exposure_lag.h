@@ -10,7 +10,7 @@
 namespace spartan::internal {
 
 /// A driver that knows only what was last set states it also for images that were exposed before, and a sensor may take
-/// a setting over a frame late. A control that believes such frames applies each factor again, and never settles.
+/// a setting over a frame late. A control that trusts such frames applies each factor again, and never settles.
 ///
 /// The light is the brightness of the ground over the product of exposure and gain. With the wrong lag each change of
 /// the settings lets it jump and jump back; the lag with the least to and fro over the last kFrames is the right one.

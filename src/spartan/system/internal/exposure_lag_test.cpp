@@ -109,8 +109,8 @@ TEST(ExposureLag, SettingsThatAreStatedRightlyAreBelieved) {
         set.push_back(last);
         const ExposureSettings taken = set[set.size() - 1 - delay];
         const auto ground = meter.measure(gray_frame(light * taken.exposure_us * taken.gain), Eigen::Vector3d::UnitZ());
-        const ExposureSettings believed = lag.add(ground, taken);
-        ASSERT_EQ(believed.exposure_us, taken.exposure_us);
+        const ExposureSettings estimated = lag.add(ground, taken);
+        ASSERT_EQ(estimated.exposure_us, taken.exposure_us);
         if (const auto wanted = ExposureControl(ExposureOptions()).update(ground, taken, 0)) last = *wanted;
       }
       EXPECT_EQ(lag.lag(), 0U);
