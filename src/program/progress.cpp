@@ -53,7 +53,7 @@ void Progress::show(int done, int total, const std::string& note) {
     return;
   }
   const auto now = std::chrono::steady_clock::now();
-  if (done < total && now - last_shown_ < kRedrawEvery) return;
+  if ((total == 0 || done < total) && now - last_shown_ < kRedrawEvery) return;
   last_shown_ = now;
   const int filled = total > 0 ? std::clamp(kBarWidth * done / total, 0, kBarWidth) : 0;
   write(fmt::format("\r[{}{}] {}/{} {}{}\033[K", std::string(static_cast<std::size_t>(filled), '#'),

@@ -9,6 +9,7 @@
 #include "program/live_input.h"
 #include "program/progress.h"
 #include "program/recording_arguments.h"
+#include "program/standard_error.h"
 #include "spartan/camera/recording_writer.h"
 #include "spartan/camera/sample_stream.h"
 
@@ -49,6 +50,7 @@ Result<ExitCode> record_command(const Context& context, const RecordArguments& a
   if (!stream) return failure(stream);
   auto recorder = StreamRecorder::create(arguments.output, (*stream)->info(), image_files_of(arguments.images));
   if (!recorder) return failure(recorder);
+  const StandardErrorBuffer standard_error;  // the cameras do not wait for a terminal
   Progress progress(context.quiet);
   const Status recorded = record_stream(**stream, **recorder, arguments.seconds, progress);
   const Status finished = (*recorder)->finish();

@@ -53,6 +53,7 @@ std::string health_message(const FrameRecord& frame) {
   json["fault"] = frame.fault;
   json["message"] = frame.message;
   json["inliers"] = frame.motion.inliers;
+  json["latency_ms"] = frame.latency_ms ? number(*frame.latency_ms) : Json(nullptr);
   Json sensors = Json::object();
   if (frame.localization) {
     for (const LocalizationRecord::Sensor& sensor : frame.localization->sensors) {

@@ -16,9 +16,10 @@ namespace {
 constexpr int kPoll_ms = 50;
 constexpr std::chrono::milliseconds kFlush{500};
 
+// Also where reading or writing would fail: a full pipe that nobody reads any more has an error, but no room.
 bool is_ready(int file, short events) {
   pollfd poll{file, events, 0};
-  return ::poll(&poll, 1, kPoll_ms) == 1 && (poll.revents & events) != 0;
+  return ::poll(&poll, 1, kPoll_ms) == 1;
 }
 
 }  // namespace

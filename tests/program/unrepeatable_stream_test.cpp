@@ -49,6 +49,7 @@ class UnrepeatableStream : public testing::RunOnSmallDrive {
     RunRequest request;
     request.input = "replay:" + drive();
     request.output = path("run");
+    request.options.longest_wait_s = 0;  // on any computer
     return request;
   }
   // At the state from which the run can be resumed.
@@ -112,6 +113,39 @@ TEST_F(UnrepeatableStream, AClockThatWentBackDoesNotEndTheRun) {
   for (std::size_t i = 1; i < frames.size(); ++i) EXPECT_GT(frames[i].stamp, frames[i - 1].stamp);
   const std::string log = testing::content_of(path("run/log.txt"));
   EXPECT_THAT(log, HasSubstr("stamps are moved")) << "what streams say is in the log of the run as well";
+}
+
+// The other pair of the rig has cameras, which deliver nothing yet.
+class WithASilentPair : public Unrepeatable {
+ public:
+  explicit WithASilentPair(SampleStream& replay) : Unrepeatable(replay), info_(replay.info()) {
+    const StereoPair front = info_.rig.pairs.front();
+    for (const std::string& name : {front.left, front.right}) {
+      Camera camera = *info_.rig.find_camera(name);
+      camera.name = "mast_" + name;
+      camera.driver = CameraDriver{};
+      camera.driver->source = "aravis:" + name;
+      info_.rig.cameras.push_back(camera);
+    }
+    info_.rig.pairs.push_back({"mast", "mast_" + front.left, "mast_" + front.right, front.nearest_m, false});
+  }
+  const StreamInfo& info() const override { return info_; }
+  std::size_t previews(const std::string& pair) const override {
+    return pair == "mast" ? 0 : Unrepeatable::previews(pair);
+  }
+
+ private:
+  StreamInfo info_;
+};
+
+TEST_F(UnrepeatableStream, MapsAreOfStopsAlsoWhereTheirCamerasDoNotAnswerYet) {
+  const auto source = replay();
+  WithASilentPair stream(*source);
+  RunRequest wanted = request();
+  wanted.max_frames = 3;
+  const auto outcome = run_live(stream, wanted, RunHooks());
+  ASSERT_TRUE(outcome) << outcome.error().message();
+  EXPECT_THAT(testing::content_of(path("run/config.yaml")), HasSubstr("maps_from: stops"));
 }
 
 }  // namespace

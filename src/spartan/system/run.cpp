@@ -350,6 +350,12 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   return outcome;
 }
 
+// A stream that can be repeated gives the same results on any computer.
+std::chrono::nanoseconds longest_wait(const SampleStream& stream, const RunOptions& options) {
+  if (stream.is_repeatable()) return {};
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * options.longest_wait_s));
+}
+
 // Null where none is wanted. `unit`: null where there is none.
 Result<std::unique_ptr<Panorama>> panorama_of(SampleStream& stream, PanTiltControl* unit, const RunRequest& request,
                                               const RunHooks& hooks) {
@@ -416,7 +422,7 @@ Result<RunOutcome> run_live(SampleStream& stream, const RunRequest& request, con
     std::optional<PanoramaStream> labelled;
     if (*panorama) labelled.emplace(continued, **panorama);
     SampleStream& samples = labelled ? static_cast<SampleStream&>(*labelled) : continued;
-    QueuedStream queue(samples, odometry ? odometry->name : "", kQueueBytes);
+    QueuedStream queue(samples, odometry ? odometry->name : "", kQueueBytes, longest_wait(samples, request.options));
     return with_store(run_source({samples, nullptr, &queue, panorama->get()}, start, wanted, hooks),
                       RunFolder{request.output}.store());
   } catch (const std::bad_alloc& exception) {

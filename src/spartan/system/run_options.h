@@ -177,7 +177,8 @@ struct RunOptions {
   LocalizationOptions localization;
   bool smoothed_trajectory = true;  ///< run(): smooth the localization after the last frame
   TerrainOptions terrain;
-  ExposureOptions exposure;  ///< of live cameras
+  double longest_wait_s = 2;  ///< of images of live cameras until they are processed, s; 0: no limit
+  ExposureOptions exposure;   ///< of live cameras
   PanoramaOptions panorama;
   CommitOptions commit;
 
@@ -225,6 +226,13 @@ struct RunOptions {
             "(trajectory_smoothed.tum); false saves the time and the memory for it (1 kB for each frame, 60 bytes for "
             "each sample of the IMU).");
     v.group("terrain", terrain);
+    v.field(
+        "longest_wait_s", longest_wait_s,
+        "Seconds for which images of live cameras wait to be processed, at most; beyond them views of other pairs are "
+        "dropped, and then frames of the odometry, so that poses are not older than this. Raising it drops fewer "
+        "frames on a computer that is too slow for a time; 0 sets no limit but 256 MB of images. Replays and "
+        "simulations drop nothing by it.",
+        between(0, 3600));
     v.group("exposure", exposure);
     v.group("panorama", panorama);
     v.group("commit", commit);

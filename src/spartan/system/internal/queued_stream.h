@@ -22,8 +22,9 @@ namespace spartan::internal {
 /// discarded() that of the stream.
 class QueuedStream : public StreamDecorator {
  public:
-  QueuedStream(SampleStream& stream, const std::string& odometry_pair, std::size_t most_bytes)
-      : StreamDecorator(stream), queue_(odometry_pair, most_bytes) {}
+  QueuedStream(SampleStream& stream, const std::string& odometry_pair, std::size_t most_bytes,
+               std::chrono::nanoseconds longest_wait = {})
+      : StreamDecorator(stream), queue_(odometry_pair, most_bytes, longest_wait) {}
   ~QueuedStream() override;
   QueuedStream(const QueuedStream&) = delete;
   QueuedStream& operator=(const QueuedStream&) = delete;

@@ -14,21 +14,28 @@
 namespace spartan::internal {
 namespace {
 
+// Whether a pair has frames, or will have: a camera that runs now may answer later.
+bool has_frames(const SampleStream& source, const StereoPair& pair, Pace pace) {
+  const bool is_of_cameras = pace == Pace::live && !source.is_repeatable();
+  return source.previews(pair.name) > 0 ||
+         (is_of_cameras && source.info().rig.find_camera(pair.left)->driver.has_value());
+}
+
 // Stops need frames of another pair than that of the odometry.
-MapSource map_source(const SampleStream& source, const RunOptions& options) {
+MapSource map_source(const SampleStream& source, const RunOptions& options, Pace pace) {
   const Rig& rig = source.info().rig;
   const StereoPair* const odometry = odometry_pair_of(rig, options);
   if (options.maps_from != MapSource::automatic || odometry == nullptr) return options.maps_from;
   const bool stops = std::any_of(rig.pairs.begin(), rig.pairs.end(), [&](const StereoPair& pair) {
-    return pair.name != odometry->name && source.previews(pair.name) > 0;
+    return pair.name != odometry->name && has_frames(source, pair, pace);
   });
   return stops ? MapSource::stops : MapSource::keyframes;
 }
 
-RunOptions options_of(const SampleStream& source, const RunRequest& request) {
+RunOptions options_of(const SampleStream& source, const RunRequest& request, Pace pace) {
   const StreamInfo& info = source.info();
   RunOptions options = request.options;
-  options.maps_from = map_source(source, options);
+  options.maps_from = map_source(source, options, pace);
   if (options.gravity_m_s2 == 0) options.gravity_m_s2 = info.gravity_m_s2.value_or(0);
   if (options.use_specified_noise) {
     options.localization =
@@ -72,7 +79,7 @@ Result<RunSetup> set_up_run(SampleStream& source, const RunRequest& request, con
                             const RunIdentity* before) {
   const StreamInfo& info = source.info();
   const std::string mask_folder = info.mask_folder();
-  RunOptions options = options_of(source, request);
+  RunOptions options = options_of(source, request, pace);
   auto pipeline = Pipeline::create(info.rig, options, workers, mask_folder, pace);
   if (!pipeline) return failure(pipeline);
   if (Status fits = pipeline->check_memory(request.memory_bytes); !fits) return failure(fits);

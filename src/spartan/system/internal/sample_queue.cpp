@@ -28,7 +28,10 @@ void SampleQueue::push(StreamRead read) {
 }
 
 void SampleQueue::make_room() {
-  while (bytes_ > most_bytes_ && (drop_oldest(true) || drop_oldest(false))) {
+  const auto drop = [&](bool view) {
+    return drop_oldest(view, fmt::format("dropped: {} MB of images waited to be processed", most_bytes_ >> 20U));
+  };
+  while (bytes_ > most_bytes_ && (drop(true) || drop(false))) {
   }
   if (sensor_samples_ <= kMostSensorSamples) return;
   const auto oldest =
@@ -38,9 +41,18 @@ void SampleQueue::make_room() {
   ++dropped_.sensor_samples;
 }
 
+// One view for each frame that comes too late, as long as there are views.
+void SampleQueue::drop_if_late(std::chrono::steady_clock::time_point now) {
+  const StreamRead& next = reads_.front();
+  if (longest_wait_ == std::chrono::nanoseconds::zero() || image_bytes(*next.sample) == 0) return;
+  const std::chrono::duration<double> waited = now - next.arrived;
+  if (waited <= longest_wait_) return;
+  const std::string reason = fmt::format("dropped: images waited for {:.1f} s to be processed", waited.count());
+  if (!drop_oldest(true, reason)) drop_oldest(false, reason);
+}
+
 // Whether there was one. Its place in the order stays.
-bool SampleQueue::drop_oldest(bool view) {
-  const std::string reason = fmt::format("dropped: {} MB of images waited to be processed", most_bytes_ >> 20U);
+bool SampleQueue::drop_oldest(bool view, const std::string& reason) {
   for (StreamRead& read : reads_) {
     const std::size_t bytes = image_bytes(*read.sample);
     if (bytes == 0 || (source_of(*read.sample) != odometry_pair_) != view) continue;
@@ -75,6 +87,7 @@ Result<StreamRead> SampleQueue::pop(std::chrono::nanoseconds timeout) {
   if (reads_.empty() && !closed_) return StreamRead{StreamRead::State::none_yet, {}, now};
   if (reads_.empty() && !reason_) return failure(reason_);
   if (reads_.empty()) return StreamRead{StreamRead::State::end, {}, now};
+  drop_if_late(now);
   StreamRead read = std::move(reads_.front());
   reads_.pop_front();
   bytes_ -= image_bytes(*read.sample);

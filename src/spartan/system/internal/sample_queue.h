@@ -23,12 +23,13 @@ struct DroppedFrames {
 
 /// Keeps the order of arrival. Where the images would exceed `most_bytes`, the oldest view of another pair than that of
 /// the odometry loses its images; where there is none, the oldest frame of the odometry does. Such a frame is delivered
-/// as MissingFrame (`dropped`; a frame of one image keeps its fault). The oldest sensor sample beyond
-/// `kMostSensorSamples` is dropped. Thread-safe for one producer and one consumer.
+/// as MissingFrame (`dropped`; a frame of one image keeps its fault). So it is where a frame is taken that has waited
+/// for longer than `longest_wait` (0: no limit): the poses of a computer that is too slow are old by no more than that.
+/// The oldest sensor sample beyond `kMostSensorSamples` is dropped. Thread-safe for one producer and one consumer.
 class SampleQueue {
  public:
-  SampleQueue(std::string odometry_pair, std::size_t most_bytes)
-      : odometry_pair_(std::move(odometry_pair)), most_bytes_(most_bytes) {}
+  SampleQueue(std::string odometry_pair, std::size_t most_bytes, std::chrono::nanoseconds longest_wait = {})
+      : odometry_pair_(std::move(odometry_pair)), most_bytes_(most_bytes), longest_wait_(longest_wait) {}
 
   void push(StreamRead read);
   /// No sample will follow: the stream ended, or failed.
@@ -44,11 +45,13 @@ class SampleQueue {
   static constexpr std::size_t kMostSensorSamples = 100'000;
 
  private:
-  bool drop_oldest(bool view);
+  bool drop_oldest(bool view, const std::string& reason);
   void make_room();
+  void drop_if_late(std::chrono::steady_clock::time_point now);
 
   const std::string odometry_pair_;
   const std::size_t most_bytes_;
+  const std::chrono::nanoseconds longest_wait_;
   mutable std::mutex mutex_;
   std::condition_variable arrived_;
   std::deque<StreamRead> reads_;

@@ -86,6 +86,35 @@ TEST(SampleQueue, DropsTheOldestFrameOfTheOdometryWhereThereIsNoView) {
   EXPECT_THAT(drain(queue), ElementsAre("narrow 5")) << "the bytes of what was dropped or taken are free again";
 }
 
+// What is taken too late: views first, and the order stays. Sensor samples are not dropped.
+TEST(SampleQueue, DropsWhatHasWaitedForTooLong) {
+  const auto now = std::chrono::steady_clock::now();
+  const auto arrived = [&](StreamRead read, std::chrono::milliseconds before) {
+    read.arrived = now - before;
+    return read;
+  };
+  for (const bool limited : {true, false}) {
+    SampleQueue queue("narrow", 100 * kFrameBytes, limited ? 1h : 0h);
+    queue.push(arrived(frame_of("narrow", 1), 2h));
+    queue.push(arrived(frame_of("wide", 2), 2h));
+    queue.push(arrived(frame_of("narrow", 3), 2h));
+    queue.push(arrived(read_of(ImuSample{Stamp{4}}), 2h));
+    queue.push(arrived(frame_of("wide", 5), 1min));
+    queue.push(arrived(frame_of("narrow", 6), 1min));
+    if (limited) {
+      EXPECT_THAT(drain(queue),
+                  ElementsAre("narrow 1", "wide 2 dropped", "narrow 3", "imu 4", "wide 5 dropped", "narrow 6"));
+      EXPECT_EQ(queue.dropped().views, 2);
+      queue.push(arrived(frame_of("narrow", 7), 2h));
+      queue.push(arrived(frame_of("narrow", 8), 1min));
+      EXPECT_THAT(drain(queue), ElementsAre("narrow 7 dropped", "narrow 8"));
+      EXPECT_EQ(queue.dropped().odometry, 1);
+    } else {
+      EXPECT_THAT(drain(queue), ElementsAre("narrow 1", "wide 2", "narrow 3", "imu 4", "wide 5", "narrow 6"));
+    }
+  }
+}
+
 // One camera of a pair is unplugged while processing cannot keep up.
 TEST(SampleQueue, IsBoundedForFramesOfOneImage) {
   const auto one_image_of = [](const std::string& pair, std::int64_t id) {

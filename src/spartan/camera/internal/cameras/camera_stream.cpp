@@ -45,10 +45,7 @@ Result<std::unique_ptr<CameraStream>> CameraStream::create(const StreamInfo& inf
                      info.rig_source);
     }
     if (!left) continue;
-    Status opened = stream->open_pair(pair, open);
-    if (opened) continue;
-    if (pair.for_odometry) return failure(opened);
-    log.error(fmt::format("pair {} is left out of this run: {}", pair.name, opened.error().message()));
+    if (Status opened = stream->open_pair(pair, open); !opened) return failure(opened);
   }
   if (stream->feeds_.empty()) {
     return failure(ErrorCode::configuration, "no camera has a driver", info.rig_source,
@@ -72,7 +69,8 @@ Status CameraStream::open_pair(const StereoPair& pair, const OpenDevice& open) {
     requests = {{{left}}, {{right}}};
   }
   for (DeviceRequest& request : requests) {
-    auto source = ImageSource::create(std::move(request), open, clock_, log_);
+    auto source = ImageSource::create(std::move(request), open, clock_, log_,
+                                      pair.for_odometry ? ImageSource::Opening::now : ImageSource::Opening::later);
     if (!source) return failure(source);
     feed->sources.push_back(std::move(*source));
   }

@@ -34,8 +34,8 @@ struct CameraStreamOptions {
 /// MissingFrame with the reason. Ends where all devices have ended; a device that is lost is opened again and again.
 class CameraStream : public SampleStream, public CameraControl {
  public:
-  /// Waits for the first frame of each pair, which is its preview. A pair that is not for the odometry is left out,
-  /// with a message, where a camera of it cannot be opened, and has no preview where it delivers no frame. Codes:
+  /// Waits for the first frame of each pair, which is its preview. A pair that is not for the odometry has none, with a
+  /// message, where it delivers no frame or a camera of it cannot be opened, which is tried again and again. Codes:
   /// `configuration` (no pair has drivers, or those of a pair do not fit), `read_error` (a camera does not answer, or
   /// delivers no image), `interrupted`, and those of `open`.
   static Result<std::unique_ptr<CameraStream>> create(const StreamInfo& info, const OpenDevice& open,

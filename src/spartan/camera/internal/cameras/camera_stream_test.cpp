@@ -22,6 +22,7 @@ namespace spartan::internal {
 namespace {
 
 using std::chrono::milliseconds;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using Clock = std::chrono::steady_clock;
 
@@ -130,8 +131,13 @@ TEST_F(CameraStreamTest, AStreamBeginsWithoutPairsThatTheOdometryDoesNotUse) {
     ASSERT_TRUE(stream) << stream.error().message();
     EXPECT_EQ((*stream)->previews("front"), 1u);
     EXPECT_EQ((*stream)->previews("mast"), 0u);
-    ASSERT_EQ(said.size(), 1u);
-    EXPECT_THAT(said[0], HasSubstr("pair mast is left out"));
+    EXPECT_THAT(said, Contains(HasSubstr("mast_right: is not there; trying again")).Times(1));
+    EXPECT_THAT(said, Contains(HasSubstr("pair mast delivers no frame")).Times(1));
+    scripts["mast_right"].openable = true;
+    while (scripts["mast_right"].opened == 0) std::this_thread::sleep_for(milliseconds(5));
+    for (const char* camera : {"mast_left", "mast_right"}) scripts[camera].add(image_read(1, 3));
+    while (source_of(next(**stream)) != "mast") continue;
+    EXPECT_TRUE((*stream)->set_exposure("mast", {2000, 1}));
   }
   said.clear();
   scripts["mast_right"].openable = true;  // but it delivers nothing

@@ -36,15 +36,27 @@ ImageSource::ImageSource(DeviceRequest request, OpenDevice open, const HostClock
 }
 
 Result<std::unique_ptr<ImageSource>> ImageSource::create(DeviceRequest request, OpenDevice open, const HostClock& clock,
-                                                         const Log& log) {
+                                                         const Log& log, Opening opening) {
   std::unique_ptr<ImageSource> source(new ImageSource(std::move(request), std::move(open), clock, log));
   auto device = source->open_(source->request_);
-  if (!device) return failure(device);
-  source->device_ = std::move(*device);
-  source->has_controls_ = source->device_->has_controls();
-  source->waits_ = source->device_->waits();
-  source->exposure_bounds_ = source->device_->exposure_bounds();
+  if (device) {
+    source->use(std::move(*device));
+  } else if (opening == Opening::now) {
+    return failure(device);
+  } else {
+    log.error(device.error().message() + "; trying again");
+  }
   return source;
+}
+
+void ImageSource::use(std::unique_ptr<CameraDevice> device) {
+  const std::lock_guard lock(mutex_);
+  device_ = std::move(device);
+  has_controls_ = device_->has_controls();
+  waits_ = device_->waits();
+  exposure_bounds_ = device_->exposure_bounds();
+  pending_exposure_ = exposure_;
+  stop_changed_.notify_all();
 }
 
 ImageSource::~ImageSource() {
@@ -61,7 +73,7 @@ void ImageSource::start(Clock::time_point first_trigger, Deliver deliver, std::f
   deliver_ = std::move(deliver);
   changed_ = std::move(changed);
   thread_ = std::thread([this] { run(); });
-  if (has_controls_) command_thread_ = std::thread([this, first_trigger] { run_commands(first_trigger); });
+  command_thread_ = std::thread([this, first_trigger] { run_commands(first_trigger); });
 }
 
 bool ImageSource::wait(Clock::time_point until) {
@@ -135,7 +147,7 @@ void ImageSource::run_commands(Clock::time_point first_trigger) {
       triggers.push_back(number);
     }
     const auto device = this->device();
-    if (!device) continue;
+    if (!device || !has_controls_) continue;
     if (exposure) report(device->set_exposure(*exposure));
     for (const std::int64_t trigger : triggers) report(send_trigger(*device, trigger));
   }
@@ -229,11 +241,7 @@ void ImageSource::reopen() {
   last_ = {};
   clocks_ = {};
   mapped_ = {};
-  const std::lock_guard lock(mutex_);
-  device_ = std::move(*device);
-  exposure_bounds_ = device_->exposure_bounds();
-  pending_exposure_ = exposure_;
-  stop_changed_.notify_all();
+  use(std::move(*device));
 }
 
 void ImageSource::deliver(CameraImage image) {

@@ -42,9 +42,10 @@ class ImageSource {
   /// An image of the camera `side` of the request. Called by the thread of the source.
   using Deliver = std::function<void(int side, StampedImage image)>;
 
-  /// Borrows the clock. Errors: those of `open`.
+  /// Borrows the clock. Errors: those of `open`, but for Opening::later, which goes on trying like after a loss.
+  enum class Opening { now, later };
   static Result<std::unique_ptr<ImageSource>> create(DeviceRequest request, OpenDevice open, const HostClock& clock,
-                                                     const Log& log);
+                                                     const Log& log, Opening opening = Opening::now);
   ~ImageSource();
   ImageSource(const ImageSource&) = delete;
   ImageSource& operator=(const ImageSource&) = delete;
@@ -75,6 +76,7 @@ class ImageSource {
  private:
   ImageSource(DeviceRequest request, OpenDevice open, const HostClock& clock, const Log& log);
   void run();
+  void use(std::unique_ptr<CameraDevice> device);
   void reopen();
   Status command(const std::function<void()>& note);
   void run_commands(std::chrono::steady_clock::time_point first_trigger);
@@ -93,7 +95,7 @@ class ImageSource {
   OpenDevice open_;
   const HostClock& host_;
   Log log_;
-  bool has_controls_ = false, waits_ = false;
+  std::atomic<bool> has_controls_ = false, waits_ = false;  // since it was opened first
   Deliver deliver_;
   std::function<void()> changed_;
 
