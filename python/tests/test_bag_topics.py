@@ -107,6 +107,20 @@ def test_rgb_of_16_bits_is_refused_at_once(ours, text, tmp_path):
         assert not (tmp_path / "recording").exists()
 
 
+@pytest.mark.parametrize("encoding", ["bgra8", "rgba8", "8UC4"])
+def test_images_with_an_alpha_channel(ours, drive, tmp_path, encoding):
+    """As the wrappers of ZED publish colour images."""
+    def change(messages, topic, message):
+        gray = np.array(message.data).reshape(message.height, message.width)
+        colour = np.stack([gray, gray // 2, 255 - gray, np.full_like(gray, 7)], axis=2)
+        return topic, messages.image(stamp_of(message), "camera", colour, encoding)
+
+    bags.import_bag(foreign(ours, tmp_path / "alpha.bag", change), tmp_path / "recording")
+    gray, read = (frames_of(spartan.open_recording(folder))[0].left for folder in (drive, tmp_path / "recording"))
+    colour = np.stack([gray, gray // 2, 255 - gray], axis=2)
+    assert np.array_equal(read, colour if encoding == "rgba8" else colour[:, :, ::-1])
+
+
 @pytest.mark.parametrize("format_, codec, layout", [
     ("bayer_rggb8; png compressed ", "png", "bayer_rggb"), ("bayer_grbg8; jpeg compressed ", "jpeg", "bayer_grbg"),
     ("mono8; png compressed ", "png", "gray"), ("png", "png", "gray")])

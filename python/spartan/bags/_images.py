@@ -13,6 +13,7 @@ from spartan._errors import Error
 # Without RGB of 16 bits, which a recording cannot hold.
 _LAYOUTS = {
     "mono8": "gray", "8UC1": "gray", "mono16": "gray", "16UC1": "gray", "rgb8": "rgb", "bgr8": "rgb", "8UC3": "rgb",
+    "rgba8": "rgb", "bgra8": "rgb", "8UC4": "rgb",
     **{f"bayer_{pattern}{bits}": f"bayer_{pattern}" for pattern in ("rggb", "grbg", "gbrg", "bggr") for bits in (8, 16)},
 }
 
@@ -33,16 +34,15 @@ def _unpacked(message: Any, layout: str) -> npt.NDArray[Any]:
     """The rows of an image that is not compressed, without their padding."""
     wide = message.encoding.endswith("16") or message.encoding.startswith("16")
     kind = np.dtype(np.uint16 if wide else np.uint8).newbyteorder(">" if message.is_bigendian else "<")
-    channels = 3 if layout == "rgb" else 1
+    channels = 1 if layout != "rgb" else 4 if message.encoding in ("rgba8", "bgra8", "8UC4") else 3
     used = message.width * channels * kind.itemsize
     if used == 0 or message.height == 0 or message.step < used or len(message.data) < message.step * message.height:
         raise ValueError(f"it has {len(message.data)} bytes for {message.width} x {message.height} pixels")
     rows = np.frombuffer(bytes(message.data), np.uint8)[: message.step * message.height].reshape(message.height, -1)
     pixels = np.ascontiguousarray(rows[:, :used]).view(kind).astype(kind.newbyteorder("="), copy=False)
-    if channels == 3:
-        pixels = pixels.reshape(message.height, message.width, 3)
-        if message.encoding.startswith("bgr") or message.encoding == "8UC3":
-            pixels = np.ascontiguousarray(pixels[:, :, ::-1])
+    if layout == "rgb":  # without alpha; encodings that name no colours are those of OpenCV
+        pixels = pixels.reshape(message.height, message.width, channels)[:, :, :3]
+        pixels = np.ascontiguousarray(pixels if message.encoding.startswith("rgb") else pixels[:, :, ::-1])
     return pixels
 
 
