@@ -15,6 +15,8 @@ from bag_files import rewritten, stamp_of  # noqa: E402
 from test_bag_errors import command  # noqa: E402
 import PIL.Image  # noqa: E402
 
+from spartan.bags._topics import guess_topics  # noqa: E402
+
 UP_IN_BODY = [0, 0, 9.81]
 
 
@@ -153,6 +155,42 @@ def test_bits_of_high_alignment_go_through_a_bag(text, tmp_path, name):
         for i, frame in enumerate(frames_of(recording)):
             assert (frame.bits, frame.alignment) == (12, "high")
             assert np.array_equal(frame.left, images[2 * i]) and np.array_equal(frame.right, images[2 * i + 1])
+
+
+# --- which images are those of the pair ---
+
+REALSENSE = ["/camera/infra1/image_rect_raw", "/camera/infra2/image_rect_raw", "/camera/aligned_depth_to_infra1/image_raw",
+             "/camera/aligned_depth_to_infra2/image_raw", "/camera/color/image_raw", "/camera/depth/image_rect_raw"]
+
+
+@pytest.mark.parametrize("topics, left, right", [
+    (REALSENSE, "/camera/infra1/image_rect_raw", "/camera/infra2/image_rect_raw"),
+    (["/stereo/left/disparity", "/stereo/left/image_rect", "/stereo/right/image_rect", "/stereo/right/confidence_map"],
+     "/stereo/left/image_rect", "/stereo/right/image_rect"),
+    (["/back_left/image", "/front_left/image_raw", "/front_right/image_raw"], "/front_left/image_raw", "/front_right/image_raw"),
+    (["/left/image_color", "/left/image_mono", "/right/image_mono"], "/left/image_mono", "/right/image_mono"),
+    (["/rig/left/image_rect", "/rig/right/image_rect", "/rig/left/image_raw"], "/rig/left/image_rect", "/rig/right/image_rect"),
+    (["/a/left/image_raw", "/b/right/image_raw"], "/a/left/image_raw", "/b/right/image_raw")])
+def test_the_images_of_a_pair_are_guessed(topics, left, right):
+    (pair,) = guess_topics({topic: "sensor_msgs/msg/Image" for topic in topics}).pairs
+    assert (pair.left, pair.right) == (left, right)
+
+
+@pytest.mark.parametrize("encoding", ["16UC1", "32FC1"])
+def test_images_of_depth_are_not_guessed(ours, tmp_path, encoding):
+    """By their encoding, where their names are those of the images of a camera."""
+    def extra(messages, header):
+        depth = np.ones((240, 320), np.uint16 if encoding == "16UC1" else np.float32)
+        return [(f"/range/{side}/image_raw", dataclasses.replace(messages.image(0, side, depth, encoding), header=header))
+                for side in ("left", "right")]
+
+    bag = foreign(ours, tmp_path / "depth.bag", extra=extra)
+    assert bags.import_bag(bag, tmp_path / "recording")["frames"] == 14
+    assert frames_of(spartan.open_recording(tmp_path / "recording"))[0].left.dtype == np.uint8
+    if encoding == "16UC1":  # named ones are read
+        (tmp_path / "rig.yaml").write_text(spartan.open_recording(tmp_path / "recording").rig.to_yaml().replace("bits: 8", "bits: 16"))
+        named = {side: f"/range/{side}/image_raw" for side in ("left", "right")}
+        assert bags.import_bag(bag, tmp_path / "named", rig=tmp_path / "rig.yaml", **named)["frames"] == 14
 
 
 # --- the IMU ---

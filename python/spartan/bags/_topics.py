@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import logging
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from spartan._errors import Error
 from spartan.bags._export_recording import DESCRIPTION_TOPIC
-from spartan.bags._reader import MessageReader
+from spartan.bags._reader import MessageReader, first_message
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _IMU, _JOINTS = "sensor_msgs/msg/Imu", "sensor_msgs/msg/JointState"
+# Words of the topics of left and of right cameras, and of images that are computed from those of both.
+_SIDES = (("left", "right"), ("cam0", "cam1"), ("infra1", "infra2"), ("camera0", "camera1"))
+_COMPUTED = {"depth", "disparity", "confidence", "compresseddepth"}
+_DEPTHS = ("16UC1", "32FC1")
 _LOG = logging.getLogger("spartan")
 
 
@@ -51,12 +57,31 @@ def is_rectified(topic: str) -> bool:
     return "rect" in topic.removesuffix("/compressed").rsplit("/", 1)[-1]
 
 
-def _side_of(topic: str) -> str | None:
-    words = topic.lower().replace("_", "/").split("/")
-    for side, names in (("left", ("left", "cam0", "infra1", "camera0")), ("right", ("right", "cam1", "infra2", "camera1"))):
-        if any(name in words for name in names):
-            return side
+def _side_of(topic: str) -> tuple[int, str] | None:
+    """0 of a left camera, 1 of a right one, and the name without the words that tell; None of other images, and of those
+    that are computed from both."""
+    words = re.split("([/_])", topic.lower())
+    if _COMPUTED & set(words):
+        return None
+    for side in (0, 1):
+        if any(names[side] in words for names in _SIDES):
+            of_pair = {names[side]: f"<{i}>" for i, names in enumerate(_SIDES)}
+            return side, "".join(of_pair.get(word, word) for word in words)
     return None
+
+
+def _guessed_pair(topics: Iterable[str]) -> PairTopics | None:
+    """Raw images before compressed and rectified ones, and two topics whose names differ in the side alone before others."""
+    sides: tuple[dict[str, str], dict[str, str]] = ({}, {})  # topics by their names without the side
+    for topic in sorted(topics, key=lambda topic: ("compressed" in topic, is_rectified(topic), topic)):
+        if found := _side_of(topic):
+            side, name = found
+            sides[side].setdefault(name, topic)
+    if not all(sides):
+        return None
+    left, right = sides
+    both = next((name for name in left if name in right), None)
+    return PairTopics("stereo", left[both or next(iter(left))], right[both or next(iter(right))])
 
 
 def guess_topics(types: dict[str, str], pairs: list[str] | None = None) -> Topics:
@@ -67,15 +92,8 @@ def guess_topics(types: dict[str, str], pairs: list[str] | None = None) -> Topic
         joints = f"/{name}/joint_states"
         found.append(PairTopics(name, f"/{name}/left/image_raw", f"/{name}/right/image_raw",
                                 joints if joints in types else None))
-    if not found:
-        sides: dict[str, list[str]] = {"left": [], "right": []}
-        for topic in sorted(types):
-            if types[topic] in _IMAGES and (side := _side_of(topic)):
-                sides[side].append(topic)
-        raw = {side: sorted(topics, key=lambda topic: ("compressed" in topic, is_rectified(topic), topic))
-               for side, topics in sides.items()}
-        if raw["left"] and raw["right"]:
-            found.append(PairTopics("stereo", raw["left"][0], raw["right"][0]))
+    if not found and (pair := _guessed_pair(topic for topic, kind in types.items() if kind in _IMAGES)):
+        found.append(pair)
     if DESCRIPTION_TOPIC not in types:
         return Topics(found, possible_imus=sorted(topic for topic, kind in types.items() if kind == _IMU))
     wheels, compass, inclinometer = (topic if types.get(topic) == _JOINTS else None
@@ -124,11 +142,17 @@ def _check_imus(bag: MessageReader, topics: Topics) -> None:
             topics.possible_imus.remove(topic)
 
 
+def _without_depths(bag: MessageReader, types: dict[str, str]) -> dict[str, str]:
+    """The topics without raw images of depth that have names of images of a left or a right camera."""
+    return {topic: kind for topic, kind in types.items()
+            if not (kind == _IMAGES[0] and _side_of(topic) and first_message(bag, topic).encoding in _DEPTHS)}
+
+
 def choose_topics(bag: MessageReader, pairs: list[str] | None, wanted: dict[str, str | None]) -> Topics:
     """The topics that were named, and guesses for the others. Raises Error where the bag has not got them."""
     types, empty = bag.types(), bag.empty_topics()
     filled = {topic: kind for topic, kind in types.items() if topic not in empty}
-    topics = guess_topics(filled, pairs)
+    topics = guess_topics(_without_depths(bag, filled), pairs)
     if wanted["left"] is not None and wanted["right"] is not None:
         topics.pairs = [PairTopics("stereo", wanted["left"], wanted["right"])]
     topics.wheels = wanted["wheels"] or topics.wheels
