@@ -263,6 +263,45 @@ TEST_F(EurocLayout, RotatesImuSamplesIntoTheBodyFrame) {
   EXPECT_LE((imu[0].accel_m_s2 - Eigen::Vector3d(-5, 4, 6)).norm(), 1e-12);
 }
 
+// A calibration that is given has a body of its own, on which T_BS does not mount the IMU.
+TEST_F(EurocLayout, TheRigThatIsGivenMountsTheImu) {
+  folder_.write("mav0/imu0/sensor.yaml", "T_BS: {rows: 4, cols: 4, data: [0,-1,0,0.2, 1,0,0,0, 0,0,1,0, 0,0,0,1]}\n");
+  folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n");
+  EXPECT_EQ(open()->info().rig.imu.body_from_imu.translation(), Eigen::Vector3d(0.2, 0, 0));
+  OpenOptions options;
+  options.rig_file = folder_.write("cameras.txt",
+                                   "cam0=[30 0 16; 0 30 8; 0 0 1]\ncam1=[30 0 16; 0 30 8; 0 0 1]\ndoffs=0\n"
+                                   "baseline=100\nwidth=32\nheight=16\n");
+  const auto without_mount = open(options);
+  EXPECT_FALSE(without_mount->info().has_imu) << "its body is the left camera";
+  EXPECT_THAT(collect_samples(*without_mount), ElementsAre("f0", "f1", "f2", "f3"));
+  EXPECT_THAT(without_mount->info().sequence.warnings, ElementsAre(HasSubstr("imu0/data.csv: is left out")));
+
+  const std::string own = to_rig_yaml(open()->info().rig);
+  const std::string cameras = own.substr(0, own.find("imu:")) + own.substr(own.find("cameras:"));
+  const auto accel_with = [&](const std::string& imu) {
+    options.rig_file = folder_.write("rig.yaml", cameras + imu);
+    return open(options)->imu_samples({}, 1).value().at(0).accel_m_s2;
+  };
+  const Eigen::Vector3d turned = accel_with("imu: {translation_m: [0, 0, 0], roll_pitch_yaw_deg: [180, 0, 0]}\n");
+  EXPECT_LE((turned - Eigen::Vector3d(4, -5, -6)).norm(), 1e-12);
+  EXPECT_EQ(accel_with(""), Eigen::Vector3d(4, 5, 6)) << "a body of its own, in whose axes the readings are";
+}
+
+// The body of this camchain is the left camera.
+TEST_F(EurocLayout, NoImuWithACamchainOfCamerasAlone) {
+  std::string camchain;
+  for (const int camera : {0, 1}) {
+    remove(fmt::format("mav0/cam{}/sensor.yaml", camera));
+    camchain += fmt::format("cam{}:\n  camera_model: pinhole\n  distortion_coeffs: [0, 0, 0, 0]\n", camera);
+    camchain += "  distortion_model: equidistant\n  intrinsics: [30, 30, 16, 8]\n  resolution: [32, 16]\n";
+  }
+  folder_.write("camchain.yaml",
+                camchain + "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
+  folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n");
+  EXPECT_FALSE(open()->info().has_imu);
+}
+
 TEST_F(EurocLayout, ReadsTheNoiseOfTheImu) {
   folder_.write("mav0/imu0/data.csv", "#timestamp,wx,wy,wz,ax,ay,az\n500000,1,2,3,4,5,6\n");
   EXPECT_EQ(open()->info().noise.imu.gyro_noise_rad_s_sqrt_hz, 0) << "no sensor.yaml: unknown";

@@ -95,6 +95,30 @@ std::string find_camera_calibration(const fs::path& mav) {
   return own;
 }
 
+// Its mount is the one that the rig states. T_BS counts where the body of the rig is that of cam0/sensor.yaml
+// (`own_body`).
+Status index_imu(const fs::path& folder, bool own_body, RecordingIndex& index) {
+  const std::string table = (folder / "data.csv").string();
+  std::error_code error;
+  if (!fs::exists(table, error)) return {};
+  const auto about = read_imu((folder / "sensor.yaml").string());
+  if (!about) return failure(about);
+  Rig& rig = index.info.rig;
+  if (own_body) rig.imu.body_from_imu = about->body_from_imu;
+  // A calibration of two cameras alone has the left one for its body, to which the axes of the IMU are not known.
+  if (rig.convention == PoseConvention::left_optical && rig.imu == ImuMount()) {
+    index.info.sequence.warnings.push_back(
+        fmt::format("{}: is left out: {} does not state the mount of the IMU; give a rig.yaml with imu, or a camchain "
+                    "with T_cam_imu, with --rig",
+                    table, index.info.rig_source));
+    return {};
+  }
+  index.info.noise.imu = about->noise;
+  index.sensor_files.push_back(table);
+  index.imu = stream_of_table(table, {}, 7, read_imu_row(rig.imu.body_from_imu.rotation()));
+  return {};
+}
+
 FrameEntry make_entry(const StampMatch& match, const EurocImages& left, const EurocImages& right) {
   FrameEntry entry;
   const Stamp any = match.left ? left.stamps[*match.left] : right.stamps[*match.right];
@@ -142,14 +166,8 @@ Result<RecordingIndex> index_euroc(const LayoutChoice& layout, const OpenOptions
     const fs::path truth = folder / name / "data.csv";
     if (index.info.truth_file.empty() && fs::exists(truth, error)) index.info.truth_file = truth.string();
   }
-  if (const fs::path imu = folder / "imu0" / "data.csv"; fs::exists(imu, error)) {
-    const auto about = read_imu((folder / "imu0" / "sensor.yaml").string());
-    if (!about) return failure(about);
-    index.info.noise.imu = about->noise;
-    if (index.info.rig.imu == ImuMount()) index.info.rig.imu.body_from_imu = about->body_from_imu;
-    index.sensor_files.push_back(imu.string());
-    index.imu = stream_of_table(imu.string(), {}, 7, read_imu_row(about->body_from_imu.rotation()));
-  }
+  const bool own_body = options.rig_file.empty() && !camchain;
+  if (Status status = index_imu(folder / "imu0", own_body, index); !status) return failure(status);
   return index;
 }
 
