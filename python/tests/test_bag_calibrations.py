@@ -4,6 +4,7 @@ import dataclasses
 import importlib.util
 import json
 import logging
+import re
 import shutil
 
 import numpy as np
@@ -13,6 +14,7 @@ import spartan
 
 bags = pytest.importorskip("spartan.bags")
 from bag_files import rewritten  # noqa: E402
+from test_bag_topics import OPTICAL, reading  # noqa: E402
 import PIL.Image  # noqa: E402
 
 
@@ -118,7 +120,7 @@ def test_rectified_images_have_the_projection_matrix(drive, drive_run, tmp_path,
             raw = np.array([[300.0, 0, 150], [0, 301, 110], [0, 0, 1]])
             message = dataclasses.replace(message, distortion_model=model, D=d, K=raw.reshape(-1), R=turn.reshape(-1))
             return [(topic, message)]
-        return []
+        return [(topic, message)] if topic == "/tf_static" else []
 
     rewritten(tmp_path / "ours.bag", tmp_path / "other.bag", change)
     topics = {side: f"/stereo/{side}/image_rect" for side in ("left", "right")} if named else {}
@@ -130,5 +132,38 @@ def test_rectified_images_have_the_projection_matrix(drive, drive_run, tmp_path,
         np.testing.assert_array_equal(camera.model.parameters["centre_px"], [159.5, 119.5])
     moved = rig.right_from_left(rig.pairs[0].name)
     np.testing.assert_allclose(moved.matrix(), spartan.Pose.from_quaternion([0, 0, 0, 1], [-0.12, 0, 0]).matrix(), atol=1e-12)
+    np.testing.assert_allclose(rig.body_from_camera("left").rotation, OPTICAL.rotation @ turn.T, atol=1e-12)  # /tf_static: raw
     run = spartan.run(tmp_path / "recording", tmp_path / "run", max_frames=4)
     assert [frame.motion.inliers for frame in run.frames] == [frame.motion.inliers for frame in drive_run.frames[:4]]
+
+
+@pytest.mark.parametrize("root", ["base_link", "camera_link"])
+@pytest.mark.parametrize("named", [False, True])
+def test_mounts_of_rectified_images(drive, tmp_path, root, named):
+    """/tf_static has the frame of the raw left camera, whose images R turns."""
+    bags.export_recording(drive, tmp_path / "ours.bag")
+    turn = spartan.Pose.from_quaternion([0.02, 0.06, 0.01, 1], [0, 0, 0])
+    root_from_raw = spartan.Pose.from_quaternion([0, 0.1, 0, 1], [0.3, 0.06, 0.9]) @ OPTICAL
+    raw_from_imu = spartan.Pose.from_quaternion([0.1, -0.2, 0.3, 1], [0.02, 0.01, -0.03])
+
+    def change(messages, topic, message):
+        if topic.endswith("camera_info"):
+            return [(topic, dataclasses.replace(message, R=turn.rotation.reshape(-1)))]
+        if not topic.endswith("image_raw"):
+            return []
+        frames = [(root, message.header.frame_id, root_from_raw), (message.header.frame_id, "imu", raw_from_imu)]
+        static = messages.transforms([messages.transform(0, *each) for each in frames])
+        extra = [("/tf_static", static), ("/imu/data", reading(messages, message.header, "imu", (1, 2, 9)))]
+        return [(topic.replace("image_raw", "image_rect"), message), *(extra if "/left/" in topic else [])]
+
+    rewritten(tmp_path / "ours.bag", tmp_path / "other.bag", change)
+    topics = {side: f"/stereo/{side}/image_rect" for side in ("left", "right")} if named else {}
+    bags.import_bag(tmp_path / "other.bag", tmp_path / "recording", **topics)
+    body_from_left = root_from_raw @ turn.inverse() if root == "base_link" else OPTICAL
+    body_from_imu = body_from_left @ turn @ raw_from_imu
+    recording = spartan.open_recording(tmp_path / "recording")
+    np.testing.assert_allclose(recording.rig.body_from_camera("left").matrix(), body_from_left.matrix(), atol=1e-9)
+    sample = next(sample for sample in recording if isinstance(sample, spartan.ImuSample))
+    np.testing.assert_allclose(sample.accel_m_s2, body_from_imu.rotation @ [1, 2, 9], atol=1e-9)
+    (line,) = re.findall(r"^imu:\n  translation_m: (.*)$", recording.rig.to_yaml(), re.MULTILINE)
+    np.testing.assert_allclose(json.loads(line), body_from_imu.translation, atol=1e-9)

@@ -18,9 +18,34 @@ from spartan.bags._topics import PairTopics, Topics, is_rectified
 _LOG = logging.getLogger("spartan")
 
 
+def _matrix_of(message: Any, key: str) -> Any:
+    """K, D, R or P of a camera_info, whose names are small letters in ROS 2."""
+    return getattr(message, key if hasattr(message, key) else key.lower())
+
+
+def _camera_info_of(bag: MessageReader, topic: str) -> tuple[str, Any]:
+    """The topic of the camera_info beside images, and its first message; None without one."""
+    near = topic.removesuffix("/compressed").rsplit("/", 1)[0] + "/camera_info"
+    return near, first_message(bag, near) if near in bag.types() and near not in bag.empty_topics() else None
+
+
+def _rectified_from_raw(bag: MessageReader, topic: str) -> _core.Pose:
+    """R of the camera_info of rectified images: image_proc leaves them in the frame of the raw camera. The identity for
+    raw images, and where R is not stated."""
+    near, message = _camera_info_of(bag, topic)
+    r = np.array([] if message is None or not is_rectified(topic) else _matrix_of(message, "R"), dtype=np.float64)
+    if not r.any():
+        return _core.Pose()
+    if r.size == 9 and np.isfinite(r).all():
+        u, scales, vt = np.linalg.svd(r.reshape(3, 3))
+        if np.abs(scales - 1).max() < 1e-3 and np.linalg.det(u @ vt) > 0:
+            return _core.Pose(np.column_stack([u @ vt, np.zeros(3)]))
+    raise Error("configuration", "R of the camera_info is no rotation matrix", near, "name images that are not rectified")
+
+
 def _camera_info_yaml(message: Any, name: str, rectified: bool) -> str:
     """The file that ROS has of a camera_info. Its K, D and R describe the raw image, P the rectified one."""
-    k, d, r, p = (getattr(message, key if hasattr(message, key) else key.lower()) for key in "KDRP")
+    k, d, r, p = (_matrix_of(message, key) for key in "KDRP")
     model = message.distortion_model
     if rectified and len(p) != 12:
         raise Error("configuration", "the camera_info of rectified images has no projection matrix P", name,
@@ -73,44 +98,45 @@ def _frame_of(message: Any) -> str:
     return str(message.header.frame_id).lstrip("/")
 
 
-def _mounted(bag: MessageReader, rig: _core.Rig, left: str, topics: Topics) -> _core.Rig:
-    """The rig on the body, with the first IMU that is connected with `left`, the frame of the left images, which becomes
-    that of `topics`. The body is base_link or, where it is not known, that of the rig.
+def _mounted(bag: MessageReader, rig: _core.Rig, topics: Topics) -> _core.Rig:
+    """The rig on the body, with the first IMU that is connected with the frame of the left images, which becomes that of
+    `topics`. The body is base_link or, where it is not known, that of the rig.
 
     Readings of an IMU whose axes are not known are worse than none: they turn the world. Raises Error for one that is
     named.
     """
-    tree = _tf_static(bag)
-    base_from_left = _between(tree, "base_link", left)
-    body_from_left = base_from_left or rig.body_from_camera("left")
-    body = "base_link" if base_from_left is not None else "the left camera, turned to x forward, y left, z up"
+    images = topics.pairs[0].left
+    tree, left, left_from_frame = _tf_static(bag), _frame_of(first_message(bag, images)), _rectified_from_raw(bag, images)
+    base_from_frame = _between(tree, "base_link", left)
+    body_from_left = rig.body_from_camera("left") if base_from_frame is None else base_from_frame @ left_from_frame.inverse()
+    body = "base_link" if base_from_frame is not None else "the left camera, turned to x forward, y left, z up"
     _LOG.info("%s: the body is %s", bag.path, body)
     named, topics.imu = topics.imu, None
     for topic in topics.possible_imus if named is None else [named]:
         frame = _frame_of(first_message(bag, topic))
-        left_from_imu = _between(tree, left, frame)
-        if left_from_imu is not None:
+        frame_from_imu = _between(tree, left, frame)
+        if frame_from_imu is not None:
             topics.imu = topic
             _LOG.info("%s: the IMU is %s in the frame '%s', mounted by /tf_static", bag.path, topic, frame)
-            return rig.mounted(body_from_left, body_from_left @ left_from_imu)
+            return rig.mounted(body_from_left, body_from_left @ left_from_frame @ frame_from_imu)
         what = f"/tf_static does not connect its frame '{frame}' with '{left}', that of the left images"
         hint = "name a calibration file with --rig"
         if named is not None:
             raise Error("configuration", f"the mount of {topic} is not known: {what}", str(bag.path), hint)
         _LOG.warning("%s: %s is left out: %s; %s", bag.path, topic, what, hint)
-    return rig if base_from_left is None else rig.mounted(body_from_left)
+    return rig if base_from_frame is None else rig.mounted(body_from_left)
 
 
 def guessed_rig(bag: MessageReader, topics: Topics) -> _core.Rig:
     """Intrinsics and baseline of the first pair by camera_info, mounts by /tf_static. Of topics of rectified images
     (is_rectified()) by P alone. Chooses the IMU of `topics`."""
     pair = topics.pairs[0]
-    types, empty, files, first = bag.types(), bag.empty_topics(), [], {}
+    files, first = [], {}
     for side, topic in (("left", pair.left), ("right", pair.right)):
-        near = topic.removesuffix("/compressed").rsplit("/", 1)[0] + "/camera_info"
-        if near not in types or near in empty:
+        near, message = _camera_info_of(bag, topic)
+        if message is None:
             raise Error("configuration", f"has no {near}", str(bag.path), "name a calibration file with --rig")
-        files.append(_camera_info_yaml(first_message(bag, near), side, is_rectified(topic)))
+        files.append(_camera_info_yaml(message, side, is_rectified(topic)))
         first[side] = first_message(bag, topic)
     with tempfile.TemporaryDirectory() as folder:
         paths = [Path(folder) / f"{side}.yaml" for side in ("left", "right")]
@@ -123,4 +149,4 @@ def guessed_rig(bag: MessageReader, topics: Topics) -> _core.Rig:
         given = read.camera(getattr(read.pairs[0], side))
         cameras.append(_core.Camera(side, given.size, given.model, layout=layout, bits=8 * pixels.dtype.itemsize))
     rig = _core.Rig.stereo(cameras[0], cameras[1], read.right_from_left(read.pairs[0].name), pair.name)
-    return _mounted(bag, rig, _frame_of(first["left"]), topics)
+    return _mounted(bag, rig, topics)
