@@ -105,6 +105,25 @@ def test_the_imu_of_a_bag_of_spartan_is_in_the_body(stops, tmp_path):
     assert "translation_m: [0.2, 0, 0]" in (tmp_path / "recording" / "rig.yaml").read_text()
 
 
+def test_the_imu_of_a_bag_of_spartan_beside_a_calibration_of_cameras_alone(drive, tmp_path):
+    """/tf_static has the cameras in base_link, in whose axes the readings are."""
+    source = spartan.open_recording(drive)
+    body_from_left = spartan.Pose.from_quaternion([0, 0.3, 0, 1], [0.2, 0.06, 0.8]) @ OPTICAL
+    writer = spartan.RecordingWriter(tmp_path / "rec", source.rig.mounted(body_from_left))
+    for frame in source:
+        writer.add(spartan.ImuSample(frame.stamp_ns, [0, 0, 0], [1, 2, 9]))
+        writer.add(spartan.StereoFrame(frame.left, frame.right, frame.stamp_ns, frame.right_stamp_ns, pair=frame.pair))
+    writer.finish()
+    bags.export_recording(tmp_path / "rec", tmp_path / "drive.bag")
+    (tmp_path / "rig.yaml").write_text(source.rig.to_yaml())  # its body is the left camera
+    bags.import_bag(tmp_path / "drive.bag", tmp_path / "recording", rig=tmp_path / "rig.yaml")
+    recording = spartan.open_recording(tmp_path / "recording")
+    sample = next(sample for sample in recording if isinstance(sample, spartan.ImuSample))
+    np.testing.assert_allclose(sample.accel_m_s2, [1, 2, 9], atol=1e-12)
+    mounted = recording.rig.body_from_camera(recording.rig.pairs[0].left)
+    np.testing.assert_allclose(mounted.matrix(), body_from_left.matrix(), atol=1e-12)
+
+
 @pytest.mark.parametrize("model", ["plumb_bob", "equidistant"])
 @pytest.mark.parametrize("named", [False, True])
 def test_rectified_images_have_the_projection_matrix(drive, drive_run, tmp_path, model, named):

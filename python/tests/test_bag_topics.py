@@ -271,6 +271,33 @@ def test_the_imu_that_is_connected_is_taken(ours, tmp_path):
     np.testing.assert_allclose(samples[0].accel_m_s2, UP_IN_BODY, atol=1e-9)
 
 
+def test_an_imu_beside_a_calibration_of_cameras_alone(ours, text, tmp_path, caplog):
+    """Its body is the left camera. /tf_static tells how the IMU is turned against it, or the IMU is left out."""
+    (tmp_path / "rig.yaml").write_text(text)
+    (sample, *_) = imported(ours, tmp_path, {"/imu0": ("imu4", (1, 2, 3)), "/camera/imu": IMU_UP}, rig=tmp_path / "rig.yaml")
+    np.testing.assert_allclose(sample.accel_m_s2, UP_IN_BODY, atol=1e-9)
+    np.testing.assert_allclose(sample.gyro_rad_s, [0, -0.01, 0], atol=1e-12)
+    with pytest.raises(spartan.Error, match="the mount of /imu0 is not known") as raised:
+        bags.import_bag(tmp_path / "other.bag", tmp_path / "named", imu="/imu0", rig=tmp_path / "rig.yaml")
+    assert raised.value.code == "configuration" and not (tmp_path / "named").exists()
+    without = foreign(ours, tmp_path / "without.bag", extra=lambda messages, header: [("/imu0", reading(messages, header, "imu4", (1, 2, 3)))])
+    with caplog.at_level(logging.WARNING, "spartan"):
+        bags.import_bag(without, tmp_path / "without", rig=tmp_path / "rig.yaml")
+    assert not samples_of(tmp_path / "without", spartan.ImuSample) and "/imu0 is left out: /tf_static does not" in caplog.text
+    assert (tmp_path / "without" / "rig.yaml").read_text() == text
+
+
+def test_an_imu_that_a_calibration_mounts(ours, text, tmp_path):
+    """By its body, in whose axes the readings are then, or by a pose; /tf_static has no say."""
+    turned = "imu:\n  translation_m: [0, 0, 0]\n  roll_pitch_yaw_deg: [180, 0, 0]\n"
+    body = text.replace("pose_convention: left_optical", "pose_convention: body")
+    for i, (rig, expected) in enumerate(((body, [1, 2, 3]), (body + turned, [1, -2, -3]), (text + turned, [1, -2, -3]))):
+        (tmp_path / f"{i}").mkdir()
+        (tmp_path / f"{i}" / "rig.yaml").write_text(rig)
+        (sample, *_) = imported(ours, tmp_path / f"{i}", {"/camera/imu": (IMU_UP[0], (1, 2, 3))}, rig=tmp_path / f"{i}" / "rig.yaml")
+        np.testing.assert_allclose(sample.accel_m_s2, expected, atol=1e-9)
+
+
 def test_a_topic_of_one_quantity_is_no_imu(ours, text, tmp_path, caplog):
     split = {"/camera/accel/sample": (*IMU_UP, (0, 0, 0)), "/camera/gyro/sample": (IMU_UP[0], (0, 0, 0))}
     with caplog.at_level(logging.WARNING, "spartan"):

@@ -98,33 +98,45 @@ def _frame_of(message: Any) -> str:
     return str(message.header.frame_id).lstrip("/")
 
 
-def _mounted(bag: MessageReader, rig: _core.Rig, topics: Topics) -> _core.Rig:
-    """The rig on the body, with the first IMU that is connected with the frame of the left images, which becomes that of
-    `topics`. The body is base_link or, where it is not known, that of the rig.
-
-    Readings of an IMU whose axes are not known are worse than none: they turn the world. Raises Error for one that is
-    named.
-    """
-    images = topics.pairs[0].left
-    tree, left, left_from_frame = _tf_static(bag), _frame_of(first_message(bag, images)), _rectified_from_raw(bag, images)
-    base_from_frame = _between(tree, "base_link", left)
-    body_from_left = rig.body_from_camera("left") if base_from_frame is None else base_from_frame @ left_from_frame.inverse()
-    body = "base_link" if base_from_frame is not None else "the left camera, turned to x forward, y left, z up"
-    _LOG.info("%s: the body is %s", bag.path, body)
+def _connected_imu(bag: MessageReader, tree: dict[str, tuple[str, _core.Pose]], left: str, topics: Topics) -> _core.Pose | None:
+    """left_from_imu of the first IMU that /tf_static connects with the frame `left`, which becomes that of `topics`. Raises
+    Error for one that is named and not connected: readings whose axes are not known are worse than none, they turn the
+    world."""
     named, topics.imu = topics.imu, None
     for topic in topics.possible_imus if named is None else [named]:
         frame = _frame_of(first_message(bag, topic))
-        frame_from_imu = _between(tree, left, frame)
-        if frame_from_imu is not None:
+        left_from_imu = _between(tree, left, frame)
+        if left_from_imu is not None:
             topics.imu = topic
             _LOG.info("%s: the IMU is %s in the frame '%s', mounted by /tf_static", bag.path, topic, frame)
-            return rig.mounted(body_from_left, body_from_left @ left_from_frame @ frame_from_imu)
+            return left_from_imu
         what = f"/tf_static does not connect its frame '{frame}' with '{left}', that of the left images"
-        hint = "name a calibration file with --rig"
+        hint = "name a calibration that states it with --rig"
         if named is not None:
             raise Error("configuration", f"the mount of {topic} is not known: {what}", str(bag.path), hint)
         _LOG.warning("%s: %s is left out: %s; %s", bag.path, topic, what, hint)
-    return rig if base_from_frame is None else rig.mounted(body_from_left)
+    return None
+
+
+def mounted(bag: MessageReader, rig: _core.Rig, topics: Topics, *, only_with_imu: bool = False) -> _core.Rig:
+    """A rig of one pair on the body, by /tf_static, with the IMU that is connected with the left images. The body is
+    base_link or, where it is not known, that of the rig. Chooses the IMU of `topics`; without one, the rig is returned
+    as it is if it moves `only_with_imu`."""
+    images = topics.pairs[0].left
+    tree, frame = _tf_static(bag), _frame_of(first_message(bag, images))
+    left_from_frame = _rectified_from_raw(bag, images)
+    frame_from_imu = _connected_imu(bag, tree, frame, topics)
+    base_from_frame = _between(tree, "base_link", frame)
+    if frame_from_imu is None and only_with_imu:
+        return rig
+    body = "base_link" if base_from_frame is not None else "the left camera, turned to x forward, y left, z up"
+    _LOG.info("%s: the body is %s", bag.path, body)
+    if frame_from_imu is None and base_from_frame is None:
+        return rig
+    body_from_left = rig.body_from_camera(rig.pairs[0].left)
+    if base_from_frame is not None:
+        body_from_left = base_from_frame @ left_from_frame.inverse()
+    return rig.mounted(body_from_left, None if frame_from_imu is None else body_from_left @ left_from_frame @ frame_from_imu)
 
 
 def guessed_rig(bag: MessageReader, topics: Topics) -> _core.Rig:
@@ -149,4 +161,4 @@ def guessed_rig(bag: MessageReader, topics: Topics) -> _core.Rig:
         given = read.camera(getattr(read.pairs[0], side))
         cameras.append(_core.Camera(side, given.size, given.model, layout=layout, bits=8 * pixels.dtype.itemsize))
     rig = _core.Rig.stereo(cameras[0], cameras[1], read.right_from_left(read.pairs[0].name), pair.name)
-    return _mounted(bag, rig, topics)
+    return mounted(bag, rig, topics)

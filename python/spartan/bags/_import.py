@@ -17,11 +17,11 @@ import numpy.typing as npt
 
 from spartan import _core
 from spartan._errors import Error
-from spartan.bags._calibration import guessed_rig
+from spartan.bags._calibration import guessed_rig, mounted
 from spartan.bags._export_recording import DESCRIPTION_TOPIC
 from spartan.bags._images import pixels_of, stamp_of
 from spartan.bags._reader import MessageReader, first_message, opened
-from spartan.bags._rigs import with_known_masks, with_layouts, with_masks_of, with_readings_in_body, write_masks
+from spartan.bags._rigs import mounts_imu, with_known_masks, with_layouts, with_masks_of, with_readings_in_body, write_masks
 from spartan.bags._topics import PairTopics, Topics, choose_topics
 
 _MOST_WAITING = 64  # images of one side without a partner
@@ -205,20 +205,25 @@ def _choose_rig(
     of topics takes its name. Chooses the IMU of `topics`."""
     if file is None and about is None:
         return guessed_rig(bag, topics), {}
-    topics.imu = topics.imu or next(iter(topics.possible_imus), None)
+    first_imu = topics.imu or next(iter(topics.possible_imus), None)
     if file is None and about is not None:
+        topics.imu = first_imu
         return about.rig, about.masks
     assert file is not None
     rig, masks = with_masks_of(_core.read_rig(file), Path(file).parent)
-    if DESCRIPTION_TOPIC in bag.types():  # Spartan writes the readings of the IMU in base_link
-        rig = with_readings_in_body(rig)
-    elif topics.imu is not None:
-        _LOG.info("%s: the IMU is %s, mounted by %s", bag.path, topics.imu, file)
     names = [pair.name for pair in rig.pairs]
     if len(topics.pairs) == 1 and names and topics.pairs[0].name not in names:
         topics.pairs[0].name = names[0]
     if missing := [pair.name for pair in topics.pairs if pair.name not in names]:
         raise Error("configuration", f"has no pair {', '.join(missing)}", str(file), f"its pairs: {', '.join(names) or 'none'}")
+    if not mounts_imu(rig):
+        rig = mounted(bag, rig, topics, only_with_imu=True)
+    else:
+        topics.imu = first_imu
+        if DESCRIPTION_TOPIC in bag.types():  # Spartan writes the readings of the IMU in base_link
+            rig = with_readings_in_body(rig)
+        elif topics.imu is not None:
+            _LOG.info("%s: the IMU is %s, mounted by %s", bag.path, topics.imu, file)
     return with_layouts(rig, _layouts_in(bag, topics, rig)), masks
 
 

@@ -20,6 +20,12 @@ def with_readings_in_body(rig: _core.Rig) -> _core.Rig:
     return _core.Rig.from_yaml(text)
 
 
+def mounts_imu(rig: _core.Rig) -> bool:
+    """Whether the axes of an IMU are known: by a pose, else as those of the body. A calibration of two cameras alone has the
+    left one for its body, as which no IMU is turned."""
+    return len(rig.pairs) > 1 or re.search("^(pose_convention: body|imu:)$", rig.to_yaml(), re.MULTILINE) is not None
+
+
 def with_layouts(rig: _core.Rig, layouts: dict[str, str]) -> _core.Rig:
     """The rig whose cameras, by their names, deliver images of these layouts."""
     text = rig.to_yaml()
