@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import logging
 import os
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,11 @@ from typing import Any
 import numpy as np
 
 from spartan import _core
+from spartan._errors import Error
 from spartan.bags._rigs import with_masks_of, with_readings_in_body
 from spartan.bags._writer import MessageWriter, open_writer
+
+_LOG = logging.getLogger("spartan")
 
 DESCRIPTION_TOPIC = "/spartan/recording"
 _ENCODINGS = {"gray": ("mono8", "mono16"), "rgb": ("rgb8", "rgb16"), "bayer_rggb": ("bayer_rggb8", "bayer_rggb16"),
@@ -107,38 +111,50 @@ def _write_sample(bag: MessageWriter, sample: Any) -> None:
         bag.write("/inclinometer", stamp, messages.joints(stamp, values))
 
 
+def _write_beginning(bag: MessageWriter, recording: _core.Recording, stamp_ns: int) -> None:
+    """What does not change: the frames of fixed cameras, and the description."""
+    messages, rig = bag.messages, recording.rig
+    fixed = [messages.transform(stamp_ns, "base_link", optical_frame(pair.name, side), rig.body_from_camera(getattr(pair, side)))
+             for pair in rig.pairs for side in ("left", "right") if rig.camera(getattr(pair, side)).mount == "body"]
+    if fixed:
+        bag.write("/tf_static", stamp_ns, messages.transforms(fixed), latched=True)
+    bag.write(DESCRIPTION_TOPIC, stamp_ns, messages.make("std_msgs/String", data=_description(recording)), latched=True)
+
+
 def export_recording(
-    recording: str | os.PathLike[str], bag: str | os.PathLike[str], *, rig: str | os.PathLike[str] | None = None,
-    storage: str = "sqlite3"
+    recording: str | os.PathLike[str] | _core.Recording, bag: str | os.PathLike[str], *,
+    rig: str | os.PathLike[str] | None = None, storage: str = "sqlite3"
 ) -> int:
-    """Writes a recording as a bag of ROS 1 (`bag` ends with .bag) or ROS 2 (a folder), or as an
-    MCAP file with Foxglove's schemas (.mcap). Returns the number of frames.
+    """Writes a recording, open or its path, as a bag of ROS 1 (`bag` ends with .bag) or ROS 2 (a folder), or as an
+    MCAP file with Foxglove's schemas (.mcap). Returns the number of frames. `rig`: calibration to use for a path instead of
+    the recording's own.
 
     Images are `/<pair>/left/image_raw` and `right`, with `camera_info`; the IMU is `/imu` in `base_link`. Wheels, compass,
     inclinometer, and pan, tilt and stop of a frame are JointState messages. `/tf_static` has the cameras that are fixed to
-    the body, `/tf` those on a pan-tilt unit. Frames with a missing image are left out.
+    the body, `/tf` those on a pan-tilt unit. Frames that are missing, or whose stamps are too far apart, are left out with a
+    warning.
     """
-    opened = _core.open_recording(recording, rig=rig)
-    frames = 0
+    if not isinstance(recording, _core.Recording):
+        recording = _core.open_recording(recording, rig=rig)
+    elif rig is not None:
+        raise Error("usage", "has no effect on an open recording", "rig", "open the recording with it")
+    for remark in recording.remarks:
+        _LOG.warning("%s: %s", recording.name, remark)
+    frames, missing, first_reason = 0, 0, ""
     with open_writer(bag, storage) as out:
         begun = False
-        for sample in opened:
+        for sample in recording:
             if isinstance(sample, _core.MissingFrame):
+                missing, first_reason = missing + 1, first_reason or sample.message
                 continue
             if not begun:
-                stamp, begun = sample.stamp_ns, True
-                messages = out.messages
-                fixed = [messages.transform(stamp, "base_link", optical_frame(pair.name, side),
-                                            opened.rig.body_from_camera(getattr(pair, side)))
-                         for pair in opened.rig.pairs for side in ("left", "right")
-                         if opened.rig.camera(getattr(pair, side)).mount == "body"]
-                if fixed:
-                    out.write("/tf_static", stamp, messages.transforms(fixed), latched=True)
-                text = messages.make("std_msgs/String", data=_description(opened))
-                out.write(DESCRIPTION_TOPIC, stamp, text, latched=True)
+                _write_beginning(out, recording, sample.stamp_ns)
+                begun = True
             if isinstance(sample, _core.StereoFrame):
-                _write_frame(out, opened.rig, sample)
+                _write_frame(out, recording.rig, sample)
                 frames += 1
             else:
                 _write_sample(out, sample)
+    if missing:
+        _LOG.warning("%s: %d frames are left out; the first one: %s", recording.name, missing, first_reason)
     return frames

@@ -100,11 +100,12 @@ def _log_terrain(rr: Any, out: Any, run: Run) -> None:
 
 
 def export_rerun(
-    run: Run | str | os.PathLike[str], path: str | os.PathLike[str], *, recording: str | os.PathLike[str] | None = None
+    run: Run | str | os.PathLike[str], path: str | os.PathLike[str], *,
+    recording: str | os.PathLike[str] | _core.Recording | None = None
 ) -> None:
     """Writes the results of a run for Rerun (`rerun FILE`): the surface of the map, trajectories, the pose of the rover with
-    its three standard deviations, terrain points, and health, by time and by frame. With the `recording` that was run also
-    the rectified left images, in front of their camera.
+    its three standard deviations, terrain points, and health, by time and by frame. With the `recording` that was run,
+    open or its path, also the rectified left images, in front of their camera.
 
     Needs `pip install spartan[rerun]`. Raises Error, after which there is no file; ImportError without Rerun.
     """
@@ -113,7 +114,8 @@ def export_rerun(
     if not opened.frames:
         raise Error("input", "has no frames", str(opened.path))
     output = UnfinishedOutput(path)
-    source = None if recording is None else _core.open_recording(recording)
+    if recording is not None and not isinstance(recording, _core.Recording):
+        recording = _core.open_recording(recording)
     output.begin()
     try:
         out = rr.RecordingStream("spartan", recording_id=opened.path.name)
@@ -121,7 +123,7 @@ def export_rerun(
         out.log("map", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         _log_trajectories(rr, out, opened)
         _log_map(rr, out, opened)
-        _log_frames(rr, out, opened, source)
+        _log_frames(rr, out, opened, recording)
         _log_terrain(rr, out, opened)
         out.flush()
         out.disconnect()
