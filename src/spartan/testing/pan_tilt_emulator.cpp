@@ -108,27 +108,32 @@ void PanTiltEmulator::execute(const std::string& command) {
 
 std::string PanTiltEmulator::query_result(const Axis& axis, const std::string& name) const {
   const char* const words = name[0] == 'P' ? "Pan" : "Tilt";
-  const auto result = [&](const std::string& what, const std::string& value) {
-    return "* " + (verbose_ ? fmt::format("{} {} is {}", what, words, value) : value);
+  const auto position = [&](const char* which, long value) {
+    return "* " + (verbose_ ? fmt::format("{} {} position is {}", which, words, value) : std::to_string(value));
+  };
+  const auto speed = [&](const char* which, long value) {
+    return "* " +
+           (verbose_ ? fmt::format("{} {} speed is {} positions/sec", which, words, value) : std::to_string(value));
   };
   switch (name[1]) {
     case 'P':
-      return result("Current", std::to_string(std::lround(axis.position)));
-    case 'D':
-      return result("Target", std::to_string(axis.target));
+      return position("Current", std::lround(axis.position));
+    case 'O':
+      return position("Target", axis.target);
     case 'N':
-      return result("Minimum", std::to_string(axis.least));
+      return position("Minimum", axis.least);
     case 'X':
-      return result("Maximum", std::to_string(axis.most));
+      return position("Maximum", axis.most);
     case 'S':
-      return result("Target speed of", std::to_string(std::lround(axis.speed)));
+      return speed("Target", std::lround(axis.speed));
+    case 'D':
+      return speed("Current", axis.position == static_cast<double>(axis.target) ? 0 : std::lround(axis.speed));
     case 'L':
-      return result("Minimum speed of", std::to_string(kSlowest));
+      return speed("Minimum", kSlowest);
     case 'U':
-      return result("Maximum speed of", std::to_string(kFastest));
+      return speed("Maximum", kFastest);
     case 'R':
-      return "* " + (verbose_ ? fmt::format("Resolution of {} in seconds arc per position is {}", words, kStep_arcsec)
-                              : fmt::format("{}", kStep_arcsec));
+      return fmt::format("* {}{}", kStep_arcsec, verbose_ ? " seconds arc per position" : "");
     default:
       return "! Illegal command";
   }
@@ -145,21 +150,25 @@ std::string PanTiltEmulator::answer_to(const std::string& command) {
   }
   if (command == "I") return "*";
   if (command.size() < 2 || (command[0] != 'P' && command[0] != 'T')) return "! Illegal command";
-  Axis& axis = axes_[command[0] == 'P' ? 0 : 1];
-  if (command.size() == 2) return query_result(axis, command);
-  return execute_on(axis, command[1], command.substr(2));
+  if (command.size() == 2) return query_result(axes_[command[0] == 'P' ? 0 : 1], command);
+  return execute_on(command[0], command[1], command.substr(2));
 }
 
-std::string PanTiltEmulator::execute_on(Axis& axis, char what, const std::string& number) {
+std::string PanTiltEmulator::execute_on(char name, char what, const std::string& number) {
+  Axis& axis = axes_[name == 'P' ? 0 : 1];
+  const char* const words = name == 'P' ? "Pan" : "Tilt";
   const long value = std::strtol(number.c_str(), nullptr, 10);
   if (what == 'S') {
-    if (value < kSlowest || value > kFastest) return "! Speed cannot be set";
+    if (value > kFastest) return fmt::format("! {} speed cannot exceed {} positions/sec", words, kFastest);
+    if (value < kSlowest) return fmt::format("! Motor speed cannot be less than {} pos/sec", kSlowest);
     axis.speed = static_cast<double>(value);
     return "*";
   }
   if (what != 'P') return "! Illegal command";
-  if (value < axis.least || value > axis.most)
-    return fmt::format("! Maximum allowable position is {}", value < 0 ? axis.least : axis.most);
+  if (value < axis.least || value > axis.most) {
+    return fmt::format("! {} allowable {} position is {}", value < 0 ? "Minimum" : "Maximum", words,
+                       value < 0 ? axis.least : axis.most);
+  }
   axis.target = value;
   return "*";
 }

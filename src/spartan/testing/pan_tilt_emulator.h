@@ -49,7 +49,7 @@ class PanTiltEmulator {
   void receive(char c);
   void execute(const std::string& command);
   std::string answer_to(const std::string& command);
-  std::string execute_on(Axis& axis, char what, const std::string& number);
+  std::string execute_on(char name, char what, const std::string& number);
   std::string query_result(const Axis& axis, const std::string& name) const;
   void move();
   void send(const std::string& text) const;

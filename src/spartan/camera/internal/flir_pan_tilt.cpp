@@ -17,7 +17,7 @@ namespace {
 constexpr double kSecondOfArc_rad = std::numbers::pi / 180 / 3600;
 constexpr double kDegree = std::numbers::pi / 180;
 
-// The number at the end of a text; terse and verbose answers end with it.
+// The number at the end of a text: terse answers end with it, and verbose ones about positions.
 std::optional<double> last_number(std::string_view text) {
   while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.remove_suffix(1);
   const auto word = text.substr(text.find_last_of(" *") + 1);
@@ -170,7 +170,7 @@ Status FlirPanTilt::connect() {
 
 Status FlirPanTilt::connect_axis(Axis& axis) {
   const auto ask_axis = [&](char what) { return query(std::string{axis.name, what}); };
-  const auto step = ask_axis('R'), least = ask_axis('N'), most = ask_axis('X'), desired = ask_axis('D');
+  const auto step = ask_axis('R'), least = ask_axis('N'), most = ask_axis('X'), desired = ask_axis('O');
   for (const auto* value : {&step, &least, &most, &desired}) {
     if (!*value) return failure(*value);
   }
@@ -245,7 +245,7 @@ Result<PanTiltReading> FlirPanTilt::read() {
     (axis.name == 'P' ? reading.angles.pan_rad : reading.angles.tilt_rad) = axis.sign * *position * axis.step_rad;
     if (std::lround(*position) == axis.target) continue;
     reading.moves = true;
-    const auto desired = query(std::string{axis.name, 'D'});
+    const auto desired = query(std::string{axis.name, 'O'});
     if (desired && std::lround(*desired) == axis.target) continue;
     connected_ = false;
     if (!desired) return failure(desired);

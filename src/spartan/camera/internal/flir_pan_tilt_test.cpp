@@ -68,6 +68,26 @@ TEST(FlirPanTilt, SaysThatItMoves) {
   ASSERT_TRUE(settle(*unit));
 }
 
+TEST(FlirPanTilt, ALongMotionIsFollowedToItsEnd) {
+  const PanTiltEmulator emulator(400);
+  const auto unit = open(emulator);
+  ASSERT_TRUE(unit);
+  ASSERT_TRUE(unit->move_to({20 * kDegree, 5 * kDegree}));
+  int moving = 0;
+  double before_rad = -1;
+  Result<PanTiltReading> reading = unit->read();
+  for (; reading && reading->moves && moving < 1000; ++moving) {
+    EXPECT_GE(reading->angles.pan_rad, before_rad);
+    before_rad = reading->angles.pan_rad;
+    std::this_thread::sleep_for(5ms);
+    reading = unit->read();
+  }
+  ASSERT_TRUE(reading) << reading.error().message();
+  EXPECT_GT(moving, 10) << "389 steps take a second";
+  EXPECT_NEAR(reading->angles.pan_rad, 20 * kDegree, kStep_rad);
+  EXPECT_NEAR(reading->angles.tilt_rad, 5 * kDegree, kStep_rad);
+}
+
 TEST(FlirPanTilt, GoesAtTheSpeedThatIsWanted) {
   PanTiltEmulator emulator;
   const double own = emulator.speed('P');
