@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -33,13 +34,14 @@ using testing::PanTiltEmulator;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-sim::SimulationRequest small_request(const std::string& capture) {
+sim::SimulationRequest small_request(const std::string& capture, const std::string& path = "length_m: 0.3",
+                                     const std::string& rig = testing::kSmallRig) {
   std::string text = testing::kSmallScenario;
-  const std::string before = "capture: {stops_m: [0]}";
-  text.replace(text.find(before), before.size(), "capture: {" + capture + "}");
+  const std::string before = "path: {length_m: 0.3}\ncapture: {stops_m: [0]}";
+  text.replace(text.find(before), before.size(), "path: {" + path + "}\ncapture: {" + capture + "}");
   sim::SimulationRequest request;
   request.scenario = sim::parse_scenario(text, "small").value();
-  request.rig = parse_rig_yaml(testing::kSmallRig, "small").value();
+  request.rig = parse_rig_yaml(rig, "small").value();
   request.drive = sim::plan_drive(request.scenario, request.rig, text, "small").value();
   return request;
 }
@@ -89,16 +91,16 @@ class RunPanorama : public ::testing::Test {
     };
     return hooks;
   }
-  // The views of the wide pair that were recorded.
-  std::vector<StereoFrame> recorded_views() const {
-    std::vector<StereoFrame> views;
+  // Those of a pair.
+  std::vector<StereoFrame> recorded_frames(const std::string& pair) const {
+    std::vector<StereoFrame> frames;
     const auto recording = open_recording(folder_.path() + "/run/live/1");
     EXPECT_TRUE(recording) << recording.error().message();
     for (auto read = (*recording)->read({}); read && read->sample; read = (*recording)->read({})) {
       const auto* frame = std::get_if<StereoFrame>(&*read->sample);
-      if (frame != nullptr && frame->pair == "wide") views.push_back(*frame);
+      if (frame != nullptr && frame->pair == pair) frames.push_back(*frame);
     }
-    return views;
+    return frames;
   }
 
   // Of pan and tilt, as the run has used it.
@@ -138,7 +140,7 @@ TEST_F(RunPanorama, IsTakenWhileTheRoverIsStationary) {
     EXPECT_EQ(events_[i + 1].position_id, events_[i].position_id);
   }
   EXPECT_GT(events_[2].position_id, events_[0].position_id);
-  const auto views = recorded_views();
+  const auto views = recorded_frames("wide");
   ASSERT_EQ(views.size(), 6u);
   EXPECT_LT(views[0].exposure_us, 10000) << "controlled before the first view";
   for (std::size_t i = 0; i < 6; ++i) {
@@ -146,6 +148,44 @@ TEST_F(RunPanorama, IsTakenWhileTheRoverIsStationary) {
     EXPECT_NEAR(views[i].tilt_rad, 65 * kDegree, 1e-6) << "the rest angle";
     EXPECT_EQ(views[i].position_id, events_[i < 3 ? 0 : 2].position_id);
   }
+}
+
+std::string small_rig_on_the_mast() {
+  std::string rig = testing::kSmallRig;
+  for (const std::string y : {"0.06", "-0.06"}) {
+    const std::string on_body = "axes: forward, translation_m: [0, " + y + ", 0.3], roll_pitch_yaw_deg: [0, 60, 0]";
+    rig.replace(rig.find(on_body), on_body.size(), "mount: mast, axes: forward, translation_m: [0, " + y + ", 0.1]");
+  }
+  return rig;
+}
+
+TEST_F(RunPanorama, BecomesAMapWhereTheOdometryIsOnTheUnitToo) {
+  LiveSimulation simulation(small_request("stops_m: [0], pan_period_s: 0.1, frame_period_s: 1",
+                                          "kind: standing, stationary_s: 100", small_rig_on_the_mast()),
+                            3, ThreadPool(1));
+  RunRequest request = this->request();
+  request.options.panorama.every_m = 10;
+  request.options.stop_delay_frames = 0;
+  request.options.panorama.settle_s = 0.05;
+  RunHooks hooks = this->hooks(100);
+  std::int64_t id_of_map = -1;
+  int views_of_map = 0;
+  const auto until = std::chrono::steady_clock::now() + 60s;
+  hooks.map = [&](const MappedStop& map, bool) {
+    id_of_map = map.position_id;
+    views_of_map = map.views;
+  };
+  hooks.should_stop = [&] { return views_of_map > 0 || std::chrono::steady_clock::now() > until; };
+  const auto outcome = run_live(simulation, request, hooks);
+  ASSERT_TRUE(outcome) << outcome.error().message();
+  ASSERT_EQ(events_.size(), 2u);
+  EXPECT_EQ(events_[1].views, 3);
+  EXPECT_EQ(id_of_map, events_[0].position_id);
+  EXPECT_EQ(views_of_map, 4) << "and a frame of the odometry";
+  const auto frames = recorded_frames("narrow");
+  const auto is_at_stop = [&](const StereoFrame& f) { return f.position_id == id_of_map; };
+  EXPECT_TRUE(std::any_of(frames.begin(), frames.end(), is_at_stop)) << "so that the recording has the map, too";
+  EXPECT_EQ(frames.back().position_id, -1);
 }
 
 // The unit loses its power in the middle, and the line is noisy.
@@ -167,7 +207,7 @@ TEST_F(RunPanorama, ByAnEmulatedUnitOnASerialLine) {
   ASSERT_TRUE(outcome) << outcome.error().message();
   ASSERT_EQ(events_.size(), 2u);
   EXPECT_EQ(events_[1].views, 3);
-  const auto views = recorded_views();
+  const auto views = recorded_frames("wide");
   ASSERT_EQ(views.size(), 3u);
   const double step_rad = PanTiltEmulator::kStep_arcsec / 3600 * kDegree;
   for (std::size_t i = 0; i < 3; ++i) {

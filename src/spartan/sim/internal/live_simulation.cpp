@@ -208,7 +208,7 @@ void LiveSimulation::expose_planned() {
   const PlannedFrame& planned = request_->drive.frames()[i];
   const FrameFaultState fault = simulator_.fault_at(i);
   const FrameCommands commands = commands_for(planned.pair, planned.time_s);
-  const bool waits_for_trigger = commands.angles.has_value();
+  const bool waits_for_trigger = commands.angles && !request_->rig.find_pair(planned.pair)->for_odometry;
   if (!fault.dropped && !waits_for_trigger) expose(i, fault, commands);
 }
 

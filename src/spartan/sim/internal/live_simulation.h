@@ -19,7 +19,7 @@
 namespace spartan::sim::internal {
 
 /// See open_live_simulation(). read() renders, so it may take longer than its timeout. From the first command of the
-/// pan-tilt unit on, its cameras take only frames that are triggered.
+/// pan-tilt unit on, its cameras take only frames that are triggered; those of the odometry go on.
 class LiveSimulation : public SampleStream, public CameraControl, public PanTiltControl {
  public:
   LiveSimulation(SimulationRequest request, double speed, const ThreadPool& workers);

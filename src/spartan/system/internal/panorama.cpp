@@ -125,16 +125,17 @@ bool Panorama::label(StereoFrame& frame) {
   latest_ = std::max(latest_, frame.left_stamp);
   if (untouched_) return true;
   frame.position_id = phase_ == Phase::idle || rover_moved_ ? -1 : position_id_;
+  const bool one_image = frame.left.empty() != frame.right.empty();
   if (frame.pair == odometry_pair_) {
     frame.pan_rad = rest_.pan_rad;
     frame.tilt_rad = rest_.tilt_rad;
-    return phase_ == Phase::idle;
+    if (!one_image && missing_.erase(frame.pair) > 0) changed_.notify_all();
+    return phase_ == Phase::idle || phase_ == Phase::beginning;
   }
   if (!pairs_.contains(frame.pair)) return true;
   const PanTiltAngles& angles = phase_ == Phase::idle ? rest_ : angles_;
   frame.pan_rad = angles.pan_rad;
   frame.tilt_rad = angles.tilt_rad;
-  const bool one_image = frame.left.empty() != frame.right.empty();
   const bool is_still = phase_ == Phase::idle || phase_ == Phase::taking;
   if (one_image || !is_still) return false;
   if (phase_ == Phase::idle || unmetered_.contains(frame.pair)) {
@@ -157,12 +158,12 @@ void Panorama::run() {
       wanted_ = false;
       // Larger than that of every panorama before, in this run and in one that it resumes.
       position_id_ = std::max(position_id_ + 1, static_cast<std::int64_t>(std::time(nullptr)));
-      phase_ = Phase::moving;
+      phase_ = odometry_pair_.empty() ? Phase::moving : Phase::beginning;
       untouched_ = false;
       views_ = 0;
     }
     report(true);
-    take_all();
+    if (begin_stop()) take_all();
     return_to_rest();
     report(false);
   }
@@ -177,6 +178,21 @@ void Panorama::report(bool begins) {
   }
   if (!begins) hooks_.log.info(fmt::format("panorama of {} views", event.views));
   if (hooks_.panorama) hooks_.panorama(event);
+}
+
+// The pipeline makes no map of views without a frame of the odometry at their stop. Where its pair is on the unit, that
+// frame is from before the unit moves.
+bool Panorama::begin_stop() {
+  if (odometry_pair_.empty()) return true;
+  {
+    const std::lock_guard lock(mutex_);
+    missing_ = {odometry_pair_};
+  }
+  for (int attempt = 1; attempt <= kAttempts; ++attempt) {
+    if (wait_for_frames()) return true;
+  }
+  hooks_.log.warning(fmt::format("no panorama: pair '{}', which it begins with, has no frame", odometry_pair_));
+  return false;
 }
 
 void Panorama::take_all() {

@@ -28,13 +28,14 @@ namespace spartan::internal {
 /// soon as the rover is stationary; it ends early where the rover drives on. A thread moves the unit, waits until it is
 /// still, and takes the frames; what goes wrong with one angle is logged, and the next one follows. At the end the unit
 /// returns to rest, as it does first of all where it is not there. Until it has returned no panorama begins, and the
-/// odometry's pair has no frames where it is on the unit, too; where it is not, kAttempts that fail are enough.
+/// odometry's pair has no frames where it is on the unit, too; where it is not, kAttempts that fail are enough. A stop
+/// has a frame of the odometry's pair: where that is on the unit, the unit begins to move after one.
 class Panorama {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `unit` and `cameras` (null: they take frames by themselves) are borrowed. The odometry takes no part in a
-  /// panorama: where its pair is on the unit, too, it has frames at the rest angles only. Code `configuration`: no
+  /// `unit` and `cameras` (null: they take frames by themselves) are borrowed. The odometry's pair takes no views:
+  /// where it is on the unit, too, it has frames at the rest angles only. Code `configuration`: no
   /// other pair of the rig is on its pan-tilt unit.
   static Result<std::unique_ptr<Panorama>> create(const Rig& rig, const std::string& odometry_pair,
                                                   const PanoramaOptions& options, PanTiltControl& unit,
@@ -57,8 +58,9 @@ class Panorama {
     update(motion.stamp);
   }
   /// Gives a frame its stop, and one of the unit's cameras its angles. False: it was not taken for a panorama, while
-  /// the unit moved, or, of the odometry's pair, during a panorama; one image is no view. Frames stay as they are until
-  /// the unit is first moved, where panoramas are taken by request() alone: the stream may have moved its cameras.
+  /// the unit moved, or, of the odometry's pair, since the unit has left its rest; one image is no view. Frames stay as
+  /// they are until the unit is first moved, where panoramas are taken by request() alone: the stream may have moved
+  /// its cameras.
   bool label(StereoFrame& frame);
 
   static constexpr int kAttempts = 3;        ///< of a motion, and of a frame
@@ -66,7 +68,7 @@ class Panorama {
   static constexpr double kPatience_s = 10;  ///< then it is logged why a panorama has not begun
 
  private:
-  enum class Phase { idle, moving, taking, returning };
+  enum class Phase { idle, beginning, moving, taking, returning };
 
   Panorama(const Rig& rig, const std::string& odometry_pair, const PanoramaOptions& options, PanTiltControl& unit,
            CameraControl* cameras, const RunHooks& hooks);
@@ -75,6 +77,7 @@ class Panorama {
   bool is_at_rest();
   void run();
   void report(bool begins);
+  bool begin_stop();
   void take_all();
   void return_to_rest();
   bool look_at(const PanTiltAngles& angles);
@@ -109,7 +112,7 @@ class Panorama {
   double next_at_m_ = 0;
   std::int64_t position_id_ = -1;
   PanTiltAngles angles_;
-  std::set<std::string> missing_;              // pairs without a frame at these angles
+  std::set<std::string> missing_;              // pairs without a frame at these angles, or at the begin
   std::set<std::string> unmetered_;            // pairs whose exposure is not set for these angles
   std::map<std::string, StereoFrame> unused_;  // for meter(), by pair
   bool metered_ = false;                       // meter() is called

@@ -140,6 +140,17 @@ class PanoramaTest : public ::testing::Test {
                  });
   }
 
+  // Frames of the odometry come until the unit begins to move.
+  static void begin(Panorama& panorama, const ScriptedUnit& unit) {
+    const std::size_t before = unit.commands().size();
+    rest_and_request(panorama);
+    repeat_until([&] { return unit.commands().size() > before; },
+                 [&](double time_s) {
+                   StereoFrame narrow = frame_at_stop("narrow", time_s);
+                   panorama.label(narrow);
+                 });
+  }
+
   PanoramaOptions options;
   RunHooks hooks;
   std::atomic<int> begun = 0, ended = 0;
@@ -156,18 +167,25 @@ TEST_F(PanoramaTest, TheOdometryOnTheUnitHasFramesBetweenPanoramas) {
   EXPECT_DOUBLE_EQ(before.pan_rad, 0.1);
   EXPECT_DOUBLE_EQ(before.tilt_rad, 0.6);
   rest_and_request(*panorama);
-  int views = 0, during = 0;
+  int views = 0, at_stop = 0, wrong = 0;
+  std::int64_t id_of_views = -1, id_of_stop = -1;
   repeat_until([&] { return ended > 0; },
                [&](double time_s) {
                  StereoFrame wide = frame_at_stop("wide", time_s), narrow = frame_at_stop("narrow", time_s);
-                 views += panorama->label(wide) ? 1 : 0;
-                 during += begun > ended && panorama->label(narrow) && narrow.position_id >= 0 ? 1 : 0;
+                 if (panorama->label(wide)) ++views, id_of_views = wide.position_id;
+                 const bool moved_before = unit.commands().size() > 1;
+                 if (!panorama->label(narrow) || narrow.position_id < 0) return;
+                 ++(moved_before ? wrong : at_stop);
+                 id_of_stop = narrow.position_id;
                });
   EXPECT_EQ(views, 2);
-  EXPECT_EQ(during, 0) << "frames of a camera that turns, as if it did not";
+  EXPECT_EQ(wrong, 0) << "frames of a camera that turns, as if it did not";
+  EXPECT_GT(at_stop, 0) << "views without a frame of the odometry become no map";
+  EXPECT_EQ(id_of_stop, id_of_views);
   StereoFrame after = frame_at_stop("narrow", 100);
   EXPECT_TRUE(panorama->label(after));
   EXPECT_DOUBLE_EQ(after.pan_rad, 0.1);
+  EXPECT_EQ(after.position_id, -1);
 }
 
 // Six refusals are more than the attempts of one motion.
@@ -208,7 +226,7 @@ TEST_F(PanoramaTest, ACancelledOneCommandsNothingButTheReturn) {
     };
     ended = 0;
     panorama = create(unit);
-    rest_and_request(*panorama);
+    begin(*panorama, unit);
     repeat_until([&] { return ended > 0; }, [](double) {});
     const auto commands = unit.commands();
     ASSERT_EQ(commands.size(), 2u);
@@ -233,8 +251,7 @@ TEST_F(PanoramaTest, TheExposureIsSetBeforeTheFirstView) {
     views += panorama->label(wide) ? 1 : 0;
   };
   repeat_until([&] { return at_rest > 3; }, step);
-  rest_and_request(*panorama);
-  repeat_until([&] { return begun > 0; }, [](double) {});
+  begin(*panorama, unit);
   repeat_until([&] { return views == 2; }, step);
   EXPECT_EQ(views, 2);
   EXPECT_EQ(at_first, Panorama::kMetered);
@@ -252,10 +269,28 @@ TEST_F(PanoramaTest, FramesStayAsTheyAreUntilTheFirstOne) {
   EXPECT_EQ(planned.position_id, 7);
   EXPECT_EQ(planned.pan_rad, 0.3);
   EXPECT_TRUE(unit.commands().empty());
-  rest_and_request(*panorama);
-  repeat_until([&] { return begun > 0; }, [](double) {});
+  begin(*panorama, unit);
   StereoFrame narrow = frame_at_stop("narrow", 3);
   EXPECT_FALSE(panorama->label(narrow));
+}
+
+// The images of a frame that has one only cannot be matched, so it begins no stop.
+TEST_F(PanoramaTest, TheUnitWaitsForAFrameOfTheOdometryOnIt) {
+  options.frame_timeout_s = 0.1;
+  ScriptedUnit unit(kRest);
+  const auto panorama = create(unit);
+  rest_and_request(*panorama);
+  int labelled = 0;
+  repeat_until([&] { return ended > 0; },
+               [&](double time_s) {
+                 StereoFrame narrow = frame_at_stop("narrow", time_s);
+                 narrow.left = FrameImage::own(Image<std::uint8_t>(4, 4), PixelFormat());
+                 labelled += panorama->label(narrow) && begun > 0 && ended == 0 ? 1 : 0;
+               });
+  EXPECT_EQ(ended, 1);
+  EXPECT_GT(labelled, 0) << "the odometry uses it";
+  for (const PanTiltAngles& angles : unit.commands()) EXPECT_TRUE(is_rest(angles));
+  EXPECT_THAT(said, HasSubstr("no panorama: pair 'narrow', which it begins with, has no frame"));
 }
 
 TEST_F(PanoramaTest, SaysWhyItDoesNotBegin) {
@@ -306,8 +341,7 @@ TEST_F(PanoramaTest, AFrameOfOneImageHasTheAnglesToo) {
   EXPECT_EQ(narrow->pan_rad, kRest.pan_rad);
   EXPECT_FALSE(partial_of("wide")) << "no view";
   unit.readings = 1'000'000;
-  rest_and_request(*panorama);
-  repeat_until([&] { return begun > 0; }, [](double) {});
+  begin(*panorama, unit);
   EXPECT_FALSE(partial_of("narrow")) << "the unit moves";
 }
 
