@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -52,15 +53,25 @@ Result<CameraPlugin> load_camera_plugin(bool aravis) {
   return plugin;
 }
 
-// The pixels of an image, which go back to the plugin with the last copy.
+// The pixels of an image, which go back to the plugin with the last copy. Rows that begin between two pixels of a row
+// before, as those of RGB that are padded to four bytes, are copied.
 template <class Pixel>
-FrameImage shared_image(const SpartanCameraImage& image, std::shared_ptr<const void> owner, const PixelFormat& camera) {
+FrameImage frame_image(const SpartanCameraImage& image, std::shared_ptr<const void> owner, const PixelFormat& camera) {
   constexpr bool colour = std::is_same_v<Pixel, Rgb8> || std::is_same_v<Pixel, Rgb16>;
   PixelFormat format;
   format.layout = colour ? PixelLayout::rgb : PixelLayout::gray;
   format.bits = image.bytes_per_sample == 2 ? 16 : 8;
+  constexpr auto pixel_bytes = static_cast<std::ptrdiff_t>(sizeof(Pixel));
+  if (image.stride_bytes % pixel_bytes != 0) {
+    Image<Pixel> pixels(image.width, image.height);
+    for (int y = 0; y < image.height; ++y) {
+      std::memcpy(pixels.row(y), static_cast<const char*>(image.pixels) + y * image.stride_bytes,
+                  static_cast<std::size_t>(image.width * pixel_bytes));
+    }
+    return interpret(FrameImage::own(std::move(pixels), format), camera);
+  }
   const ImageView<const Pixel> view(static_cast<const Pixel*>(image.pixels), image.width, image.height,
-                                    image.stride_bytes / static_cast<std::ptrdiff_t>(sizeof(Pixel)));
+                                    image.stride_bytes / pixel_bytes);
   return interpret(FrameImage::share(view, format, std::move(owner)), camera);
 }
 
@@ -144,13 +155,13 @@ CameraImage PluginCamera::image_of(const SpartanCameraImage& image) const {
       formats_[std::min<std::size_t>(static_cast<std::size_t>(image.side), formats_.size() - 1)];
   const bool colour = image.channels == 3, wide = image.bytes_per_sample == 2;
   if (colour && wide) {
-    out.image = shared_image<Rgb16>(image, std::move(owner), format);
+    out.image = frame_image<Rgb16>(image, std::move(owner), format);
   } else if (colour) {
-    out.image = shared_image<Rgb8>(image, std::move(owner), format);
+    out.image = frame_image<Rgb8>(image, std::move(owner), format);
   } else if (wide) {
-    out.image = shared_image<std::uint16_t>(image, std::move(owner), format);
+    out.image = frame_image<std::uint16_t>(image, std::move(owner), format);
   } else {
-    out.image = shared_image<std::uint8_t>(image, std::move(owner), format);
+    out.image = frame_image<std::uint8_t>(image, std::move(owner), format);
   }
   return out;
 }

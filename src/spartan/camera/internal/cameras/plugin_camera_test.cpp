@@ -134,6 +134,34 @@ TEST_F(Pipelines, TwoSinksDeliverEveryImageOfAFileUnchanged) {
   EXPECT_EQ(reports[0].cameras[1].images, kImages);
 }
 
+// Rows of 198 bytes begin at multiples of four.
+TEST_F(Pipelines, RowsOfColourMayBePadded) {
+  const auto colour = [](int x, int y, int side) {
+    const int value = x * 3 + y * 7 + side * 101;
+    return Rgb8{static_cast<std::uint8_t>(value), static_cast<std::uint8_t>(value + 50),
+                static_cast<std::uint8_t>(2 * value)};
+  };
+  for (int side = 0; side < 2; ++side) {
+    Image<Rgb8> image(kWidth, kHeight);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) image(x, y) = colour(x, y, side);
+    }
+    for (int i = 0; i < kImages; ++i)
+      ASSERT_TRUE(write_png(folder.file(fmt::format("{}/{:03}.png", side, i)), image.view()));
+  }
+  auto stream =
+      open(images_of(0) + " ! appsink name=left " + images_of(1) + " ! appsink name=right", "pixel_layout: rgb,");
+  ASSERT_TRUE(stream) << stream.error().message();
+  const auto frames = frames_of(**stream);
+  ASSERT_EQ(frames.size(), static_cast<std::size_t>(kImages));
+  for (int side = 0; side < 2; ++side) {
+    const auto view = (side == 0 ? frames[0].left : frames[0].right).as<Rgb8>();
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) ASSERT_EQ(view(x, y), colour(x, y, side)) << side << ' ' << x << ' ' << y;
+    }
+  }
+}
+
 TEST_F(Pipelines, ASideBySideImageIsCutInTwo) {
   auto stream =
       open(fmt::format("compositor name=both sink_1::xpos={} ! video/x-raw,format=AYUV ! videoconvert ! "
