@@ -100,7 +100,7 @@ void CameraStream::start() {
 void CameraStream::add(Feed& feed, int side, StampedImage image) {
   std::unique_lock lock(mutex_);
   if (feed.waits) {
-    changed_.wait(lock, [&] { return feed.pairing.waiting(side) < kMostWaiting || closing_; });
+    changed_.wait(lock, [&] { return has_room(feed, side) || closing_; });
   } else if (feed.pairing.waiting(side) >= kMostWaiting) {
     feed.pairing.drop_oldest(side);
     ++feed.report.not_taken;
@@ -182,7 +182,8 @@ Result<StereoFrame> CameraStream::preview(const std::string& pair, std::size_t i
 
 Clock::time_point CameraStream::next_timeout(Clock::time_point latest) const {
   for (const auto& feed : feeds_) {
-    if (const auto time = feed->pairing.next_timeout()) latest = std::min(latest, *time);
+    const auto time = feed->waits ? std::nullopt : feed->pairing.next_timeout();
+    if (time) latest = std::min(latest, *time);
   }
   return latest;
 }
@@ -219,11 +220,31 @@ Result<StreamRead> CameraStream::read(std::chrono::nanoseconds timeout) {
 }
 
 void CameraStream::take_all(Clock::time_point now) {
+  const Clock::time_point never, at_once = now + options_.pair_wait;
   for (const auto& feed : feeds_) {
-    const bool alone = is_one_camera_silent(*feed, now);
-    while (auto pair = feed->pairing.take(alone ? now + options_.pair_wait : now)) take_pair(*feed, *pair);
+    const bool silent = is_one_camera_silent(*feed, now);
+    const auto time_for_single_images = [&] {
+      if (feed->waits) return lacks_partners(*feed) ? at_once : never;
+      return silent ? at_once : now;
+    };
+    while (auto pair = feed->pairing.take(time_for_single_images())) take_pair(*feed, *pair);
   }
   changed_.notify_all();
+}
+
+// Of a file: one device delivers the images of both cameras, so it is read on where one of them has none yet.
+bool CameraStream::has_room(const Feed& feed, int side) {
+  const bool partner_follows = feed.sources.size() == 1 && feed.pairing.waiting(1 - side) == 0;
+  return feed.pairing.waiting(side) < (partner_follows ? kMostAhead : kMostWaiting);
+}
+
+// Whether images of a file, all of one camera, need no longer wait for those of the other one. How long they have
+// waited says nothing: the files are not read while the run is prepared.
+bool CameraStream::lacks_partners(const Feed& feed) {
+  const int side = feed.pairing.waiting(0) > 0 ? 0 : 1;
+  const bool one_device = feed.sources.size() == 1;
+  const ImageSource& other = *feed.sources[one_device || side == 1 ? 0 : 1];
+  return other.ended() || other.is_lost() || (one_device && !has_room(feed, side));
 }
 
 // Whether one of the cameras no longer delivers, so that its images are not waited for. One that was lost is waited for

@@ -31,7 +31,8 @@ struct CameraStreamOptions {
 };
 
 /// The pairs of a rig whose cameras have drivers. An image without a partner, and a trigger without an image, come as
-/// MissingFrame with the reason. Ends where all devices have ended; a device that is lost is opened again and again.
+/// MissingFrame with the reason; of files, whose images wait, only where a partner can no longer come. Ends where all
+/// devices have ended; a device that is lost is opened again and again.
 class CameraStream : public SampleStream, public CameraControl {
  public:
   /// Waits for the first frame of each pair, which is its preview. A pair that is not for the odometry has none, with a
@@ -57,6 +58,7 @@ class CameraStream : public SampleStream, public CameraControl {
   std::vector<CameraPairReport> camera_reports() const override;
 
   static constexpr std::size_t kMostWaiting = 16;  ///< images of a camera that no call of read() has taken
+  static constexpr std::size_t kMostAhead = 64;  ///< of a file with the images of both cameras, where one has none yet
 
  private:
   // The devices of a pair and what they have delivered.
@@ -77,6 +79,8 @@ class CameraStream : public SampleStream, public CameraControl {
   Status open_pair(const StereoPair& pair, const OpenDevice& open);
   void start();
   void add(Feed& feed, int side, StampedImage image);
+  static bool has_room(const Feed& feed, int side);
+  static bool lacks_partners(const Feed& feed);
   static bool is_one_camera_silent(Feed& feed, std::chrono::steady_clock::time_point now);
   void take_all(std::chrono::steady_clock::time_point now);
   void take_pair(Feed& feed, const ImagePair& pair);
