@@ -144,11 +144,17 @@ Result<std::optional<Sample>> ReplayStream::fetch_any() {
     offset_.stamp = Stamp{begin.ns - first_stamp_->ns};
     offset_.frame_id = last_.frame_id + 1;
     offset_.position_id = last_.position_id + 1;
+    if (first_wheels_) {
+      offset_.left_m -= first_wheels_->left_m;
+      offset_.right_m -= first_wheels_->right_m;
+    }
     sample = recording_->next();
     if (!sample) return sample;
   }
   if (!*sample) return std::nullopt;
   if (!first_stamp_) first_stamp_ = stamp_of(**sample);
+  const auto* const wheels = std::get_if<WheelSample>(&**sample);
+  if (wheels != nullptr && !first_wheels_) first_wheels_ = *wheels;
   shift(**sample);
   note(**sample);
   return sample;

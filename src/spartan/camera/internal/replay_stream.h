@@ -80,7 +80,8 @@ class ReplayStream : public SampleStream {
   std::optional<Stamp> start_stamp_;
 
   // Of the thread.
-  std::optional<Stamp> first_stamp_;  // of the recording
+  std::optional<Stamp> first_stamp_;         // of the recording
+  std::optional<WheelSample> first_wheels_;  // of the recording
   Progress offset_, last_;
 
   mutable std::mutex mutex_;

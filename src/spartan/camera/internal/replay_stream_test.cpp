@@ -107,6 +107,21 @@ TEST_F(ReplayStreamTest, SeveralPassesGoOnInTimeNumberAndDistance) {
   EXPECT_THAT(left_m, ElementsAre(0, 0.5, 0.5, 1, 1, 1.5));
 }
 
+// As those of a rover that has driven before.
+TEST_F(ReplayStreamTest, DistancesOfWheelsGoOnWhateverTheyBeginWith) {
+  folder_.write("sensors/wheels.csv", "stamp_ns,left_m,right_m\n0,7,8\n150000000,7.5,8.75\n");
+  ReplayStream stream = open(1, 3);
+  std::vector<double> left_m, right_m;
+  for (const StreamRead& read : read_all(stream)) {
+    const auto* const wheels = std::get_if<WheelSample>(&*read.sample);
+    if (wheels == nullptr) continue;
+    left_m.push_back(wheels->left_m);
+    right_m.push_back(wheels->right_m);
+  }
+  EXPECT_THAT(left_m, ElementsAre(7, 7.5, 7.5, 8, 8, 8.5));
+  EXPECT_THAT(right_m, ElementsAre(8, 8.75, 8.75, 9.5, 9.5, 10.25));
+}
+
 TEST_F(ReplayStreamTest, WhileItSkipsItCanBeLeft) {
   ReplayStream stream = open(1, 1'000'000'000);
   stream.start_after(Stamp::from_seconds(1e9));
