@@ -1,8 +1,7 @@
 # Installs BUILD to a fresh prefix under WORK, then configures, builds and runs the consumer projects against it, from
-# copies of their sources, so that nothing but the installed files can help.
+# copies of the installed example, so that nothing but the installed files can help.
 set(prefix "${WORK}/prefix")
 file(REMOVE_RECURSE "${WORK}")
-file(COPY "${CMAKE_CURRENT_LIST_DIR}/" DESTINATION "${WORK}/source" PATTERN "run.cmake" EXCLUDE)
 
 file(READ "${CMAKE_CURRENT_LIST_DIR}/../../README.md" readme)
 if(NOT readme MATCHES "```cpp\n([^`]*)```")
@@ -27,6 +26,7 @@ function(build source folder)
 endfunction()
 
 run("${CMAKE_COMMAND}" --install "${BUILD}" --prefix "${prefix}")
+file(COPY "${prefix}/share/doc/spartan/example/" DESTINATION "${WORK}/source")
 build("${WORK}/source" "${WORK}/build")
 run("${WORK}/build/consumer")
 run("${WORK}/build/stream" "${WORK}/stream_run")
@@ -37,9 +37,8 @@ foreach(file IN ITEMS summary.json trajectory_odometry.tum live/1/frames.csv)
 endforeach()
 run("${prefix}/bin/spartan" --help)
 
-foreach(file IN ITEMS doc/spartan/LICENSE doc/spartan/example/CMakeLists.txt doc/spartan/example/main.cpp
-    bash-completion/completions/spartan zsh/site-functions/_spartan fish/vendor_completions.d/spartan.fish
-    man/man1/spartan.1)
+foreach(file IN ITEMS doc/spartan/LICENSE bash-completion/completions/spartan zsh/site-functions/_spartan
+    fish/vendor_completions.d/spartan.fish man/man1/spartan.1)
   if(NOT EXISTS "${prefix}/share/${file}")
     message(FATAL_ERROR "share/${file} is not installed")
   endif()
