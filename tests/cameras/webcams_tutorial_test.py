@@ -1,18 +1,22 @@
 #!/usr/bin/env python3
-"""The steps of docs/tutorials/webcams.md, with a rendered drive in place of the webcams.
+"""The steps of docs/tutorials/webcams.md, with a rendered drive in place of the webcams, and the chessboards of OpenCV in
+$SPARTAN_DATA for their calibration.
 
     webcams_tutorial_test.py SPARTAN SOURCE SMALL_RUNS
 
 Without the plugin of GStreamer the test is skipped (77).
 """
+import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 
 SKIPPED = 77
 RATE_HZ = 5
+DEBIAN_PYTHON = "/usr/bin/python3"  # has OpenCV by the package python3-opencv
 
 
 def spartan(program, folder, line, replaced, accepted=(0,)):
@@ -39,12 +43,43 @@ def scaled(calibration):
     return "\n".join(lines) + "\n"
 
 
+def calibrate(program, text, convert):
+    """By images of chessboards, each of which comes twice, as of a board that is held still."""
+    boards = pathlib.Path(os.environ.get("SPARTAN_DATA", "")) / "opencv_chessboard"
+    if not boards.is_dir():
+        print("not tried: calibration, no opencv_chessboard in $SPARTAN_DATA")
+        return
+    if subprocess.run([DEBIAN_PYTHON, "-c", "import cv2"], capture_output=True).returncode != 0:
+        print("not tried: calibration, python3-opencv is not installed (./setup test)")
+        return
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        images = folder / "recording/images/stereo"
+        images.mkdir(parents=True)
+        lefts = sorted(boards.glob("left??.jpg"))
+        for i, left in enumerate(left for left in lefts for _ in range(2)):
+            for side, file in (("left", left), ("right", left.with_name(left.name.replace("left", "right")))):
+                shutil.copy(file, images / f"{1_700_000_000 + i}000000000_{side}.jpg")
+        (folder / "calibrate.py").write_text(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1])
+        words = re.search(r"^python3 (calibrate\.py .*)", text, re.MULTILINE)[1].replace("RECORDING", "recording").split()
+        done = subprocess.run([DEBIAN_PYTHON, *words[:-1], "calibration"], cwd=folder, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stdout + done.stderr
+        views, rms, baseline = re.fullmatch(r"(\d+) views, (\S+) px RMS, baseline (\S+) m\n", done.stdout).groups()
+        assert int(views) >= len(lefts) - 1 and float(rms) < 0.5 and abs(float(baseline) - 0.0834) < 0.0005, done.stdout
+        spartan(program, folder, convert, {"DIR": "calibration"})
+        told = spartan(program, folder, f"spartan rig inspect rig.yaml {boards}/left*.jpg {boards}/right*.jpg", {})
+        rows = float(re.search(r"rectified with the given calibration (\S+) px", told)[1])
+        assert "pair stereo: calibration: good" in told and rows < 0.4, told
+        print(f"{done.stdout.strip()}, rows agree to {rows} px")
+
+
 def main():
     program, source, small_runs = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
     text = (source / "docs/tutorials/webcams.md").read_text(encoding="utf-8")
     rig = re.search(r"```yaml\n(.*?)```", text, re.DOTALL)[1]
     lines = re.findall(r"^spartan .*", text, re.MULTILINE)
     drive = small_runs / "drive"
+    calibrate(program, text, lines[1])
     for device, images in (("video0", "image_0"), ("video2", "image_1")):
         camera = f"v4l2src device=/dev/{device} !"
         assert rig.count(camera) == 2, rig
