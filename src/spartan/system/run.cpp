@@ -287,6 +287,11 @@ Result<RunOutcome> run_source(const RunSource& source, const RunStart& start, co
   }
   auto store = open_store(request, folder, identity);
   if (!store) return failure(store);
+  if (source.recording) {
+    RunInput input{request.input, request.open};
+    input.open.format = source.recording->info().format;
+    if (Status s = write_run_input(input, folder); !s) return failure(s);
+  }
   if (Status s = write_file_atomically(folder.config(), identity.options); !s) return failure(s);
   const auto stored_rig = with_self_masks_in(folder.path, rig, info.mask_folder());
   if (!stored_rig) return failure(stored_rig);

@@ -67,11 +67,12 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
 }
 
 Result<ReplacedFolder> replace_run_folder(const RunFolder& folder) {
-  constexpr std::array<std::string_view, 15> kEntries{"run.sqlite",
+  constexpr std::array<std::string_view, 16> kEntries{"run.sqlite",
                                                       "run.sqlite-wal",
                                                       "run.sqlite-shm",
                                                       "config.yaml",
                                                       "rig.yaml",
+                                                      "input.yaml",
                                                       "log.txt",
                                                       "summary.json",
                                                       "trajectory_odometry.tum",

@@ -50,6 +50,7 @@ struct RunFolder {
   std::string store() const { return path + "/run.sqlite"; }
   std::string config() const { return path + "/config.yaml"; }
   std::string rig() const { return path + "/rig.yaml"; }
+  std::string input() const { return path + "/input.yaml"; }
   std::string terrain() const { return path + "/terrain"; }
   std::string maps() const { return path + "/maps"; }
   /// What a live run has recorded of its stream, from 1; after each resume another one.
@@ -65,6 +66,18 @@ struct RunFolder {
   std::string summary() const { return path + "/summary.json"; }
   std::string log() const { return path + "/log.txt"; }
 };
+
+/// The recording of a run, and how to read it.
+struct RunInput {
+  std::string recording;
+  OpenOptions open;
+};
+/// Completes what `given` leaves open by what the run notes of its recording at its start, of older versions by the
+/// summary; the calibration is that of the run. `recording` is empty where the run states none or it is not there any
+/// more. Code `configuration`: the note is damaged.
+Result<RunInput> complete_run_input(RunInput given, const RunFolder& folder);
+/// The note, with absolute paths.
+Status write_run_input(const RunInput& input, const RunFolder& folder);
 
 enum class FolderState { created, existed };
 
