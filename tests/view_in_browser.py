@@ -8,7 +8,7 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
-from view_requests import check, json_of, served
+from view_requests import check, json_of, owned, served
 
 VENV_PYTHON = Path(__file__).resolve().parent.parent / ".venv/bin/python3"  # made by ./setup
 try:
@@ -217,9 +217,9 @@ def check_many_frames(program, many):
         browser = Browser(playwright, url)
         with browser.page(1600, images=False) as page:
             total = page.evaluate("() => spartan.state().total")
-            page.wait_for_timeout(1500)  # an ended run is not asked for again
+            page.wait_for_timeout(1500)  # of an ended run only whether it was resumed is asked
             asked = []
-            page.on("request", lambda request: asked.append(request.url))
+            page.on("request", lambda request: request.url.endswith("/api/run") or asked.append(request.url))
             step = page.evaluate(STEPS)
             page.focus("#time")
             for key in ("Home", "ArrowRight", "End", "ArrowLeft"):
@@ -246,6 +246,44 @@ def follow(program, run, drive):
         check(view.wait(timeout=20) == 0, "the view ends")
 
 
+# The frame whose image was asked for, the width of the image that is shown, and the note below it.
+IMAGE = """() => [spartan.state().imaged, document.getElementById('image').naturalWidth,
+  document.getElementById('image-note').textContent]"""
+
+
+def check_resumed(program, run, drive, page, ended):
+    """The page of an ended run follows it when it is resumed."""
+    process = subprocess.Popen([program, "run", f"replay:{drive}", "-o", str(run), "--passes", "1000", "-q", "--resume"],
+                               stdout=subprocess.DEVNULL)
+    try:
+        page.wait_for_function(f"() => spartan.state().total > {ended} + 5 && spartan.state().imaged > {ended}", timeout=60000)
+        check("goes on" in page.inner_text("#state"), "the page tells that the run goes on")
+        check(page.evaluate(IMAGE)[1] > 0, f"its images are shown: {page.evaluate(IMAGE)}")
+    finally:
+        process.send_signal(signal.SIGINT)
+        check(process.wait(timeout=120) in (0, 6), "the resumed run ends well")
+    page.wait_for_function("() => !document.getElementById('state').textContent.includes('goes on')", timeout=20000)
+
+
+def check_missing_image(program, run):
+    """The last frame of a live run has no image: while the run goes on, that of the frame before is shown."""
+    with served(program, run) as url:
+        last = json_of(f"{url}/api/run")["frames"] - 1
+        stamp = json_of(f"{url}/api/frames?from={last}")["stamp_ns"][0]
+    for file in run.glob(f"live/*/images/*/{stamp}_*"):
+        file.unlink()
+    with served(program, run) as url, sync_playwright() as playwright:
+        with owned(run), Browser(playwright, url).page(1600) as page:
+            note = f"Image of frame {last}: later ones are not recorded yet. "
+            page.wait_for_timeout(1000)
+            check(page.inner_text("#image-note").startswith(note.strip()), page.inner_text("#image-note"))
+        with Browser(playwright, url).page(1600) as page:
+            page.focus("#time")
+            page.keyboard.press("End")
+            page.wait_for_timeout(1000)
+            check("no image of this frame" in page.inner_text("#image-note"), page.inner_text("#image-note"))
+
+
 def check_live(program, drive, folder):
     """A page that is open while a run begins, goes on and ends."""
     run = folder / "live_run"
@@ -253,20 +291,25 @@ def check_live(program, drive, folder):
         browser = Browser(playwright)  # before the run begins
         with follow(program, run, drive) as (browser.url, process):
             with browser.page(1600) as page:
-                seen = []
+                seen, images = [], []
                 until = time.monotonic() + 180
                 while len(set(seen)) < 4 and time.monotonic() < until:
                     seen.append(page.evaluate("() => spartan.state().total"))
+                    images.append(page.evaluate(IMAGE))
                     time.sleep(0.3)
                 check(process.poll() is None and len(set(seen)) == 4, f"frames arrive while the run goes on: {seen}")
+                check(all(width > 0 for _, width, _ in images), f"an image is shown while the run goes on: {images}")
+                check(len({frame for frame, _, _ in images}) > 2, f"and it is the last one that is there: {images}")
                 process.send_signal(signal.SIGINT)
                 process.wait(timeout=120)
                 page.wait_for_function("() => !document.getElementById('state').textContent.includes('goes on')", timeout=20000)
                 seen.append(page.evaluate("() => spartan.state().total"))
                 check("image to pose" in page.inner_text("#plots"), "latencies are plotted")
-            latencies = json_of(f"{browser.url}/api/frames?from=0")["latency_ms"]
-            check(len(latencies) == seen[-1] and all(0 < ms < 60000 for ms in latencies), f"latencies: {latencies}")
-            check(seen == sorted(seen), f"no frame disappears: {seen}")
-            total = len([line for line in (run / "trajectory_odometry.tum").read_text().splitlines() if line[0] != "#"])
-            check(seen[-1] == total, f"{seen[-1]} frames at the end, of {total}")
+                latencies = json_of(f"{browser.url}/api/frames?from=0")["latency_ms"]
+                check(len(latencies) == seen[-1] and all(0 < ms < 60000 for ms in latencies), f"latencies: {latencies}")
+                check(seen == sorted(seen), f"no frame disappears: {seen}")
+                total = len([line for line in (run / "trajectory_odometry.tum").read_text().splitlines() if line[0] != "#"])
+                check(seen[-1] == total, f"{seen[-1]} frames at the end, of {total}")
+                check_resumed(program, run, drive, page, seen[-1])
             check(not browser.told, f"the console tells nothing: {browser.told}")
+    check_missing_image(program, run)

@@ -1,5 +1,7 @@
 """Of view_test.py: a view that is served, and requests to it."""
+import fcntl
 import json
+import os
 import subprocess
 import sys
 import urllib.error
@@ -21,6 +23,17 @@ def served(program, *arguments):
     finally:
         process.terminate()
         check(process.wait(timeout=20) == 0, f"view ends with exit code {process.returncode}")
+
+
+@contextmanager
+def owned(run):
+    """A run that goes on, as far as its folder tells."""
+    lock = run / "owner.lock"
+    with lock.open("w", encoding="utf-8") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        print(os.getpid(), file=file, flush=True)
+        yield
+    lock.unlink()
 
 
 def get(url, **headers):

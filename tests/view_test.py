@@ -24,7 +24,7 @@ import urllib.request
 from pathlib import Path
 
 from view_in_browser import AXE, CHROMIUM, check_in_browser, check_live, check_many_frames, sync_playwright
-from view_requests import check, get, json_of, served
+from view_requests import check, get, json_of, owned, served
 
 
 def check_answers(program, run, recording):
@@ -107,6 +107,58 @@ def check_recordings_of_live_run(program, drive, folder):
             check(status == 200, f"image {frame} of a live run: {status} {content[:200]}")
 
 
+def check_images_before_they_are_listed(program, drive, folder):
+    """Of a live run, while it goes on and when it has ended; the last frame is never recorded."""
+    run = folder / "recorded"
+    run_into(program, f"replay:{drive}", run, "--speed", "20")
+    table = run / "live/1/frames.csv"
+    table.write_text("".join(table.read_text(encoding="utf-8").splitlines(keepends=True)[:4]), encoding="utf-8")
+    with served(program, run) as url:
+        last = json_of(f"{url}/api/run")["frames"] - 1
+        stamp = json_of(f"{url}/api/frames?from={last}")["stamp_ns"][0]
+        check(json_of(f"{url}/api/run")["last_image"] == last, "all images are there")
+        left, right = (next((run / "live/1/images").rglob(f"{stamp}_{side}.pnm")) for side in ("left", "right"))
+        left.write_bytes(left.read_bytes()[:1000])
+        right.unlink()
+        with owned(run):
+            check(get(f"{url}/api/image?frame={last - 1}")[0] == 200, "a frame that is not listed yet")
+            status, _, content = get(f"{url}/api/image?frame={last}")
+            check(status == 204, f"an image that is not complete yet: {status} {content[:200]}")
+            check(not json_of(f"{url}/api/run")["ended"], "a run whose folder a process owns goes on")
+        about = json_of(f"{url}/api/run")
+        check(about["ended"], f"a run whose folder nobody owns has ended: {about}")
+        status, _, content = get(f"{url}/api/image?frame={last}")
+        check(status == 404 and b"no image" in content, f"an image that was never recorded: {status} {content[:200]}")
+    with served(program, run) as url:
+        check(json_of(f"{url}/api/run")["last_image"] == last - 1, "the last frame that has images")
+
+
+def check_run_by_rig(program, drive, run, folder):
+    """Of recordings without a calibration, or with another one, run from another folder."""
+    rig = (run / "rig.yaml").read_text(encoding="utf-8")
+    images = folder / "images"
+    for side, name in (("image_0", "left"), ("image_1", "right")):
+        shutil.copytree(drive / side, images / name)
+    shutil.copytree(drive, folder / "calibrated")
+    check('"stereo"' in rig, rig)
+    (folder / "rig.yaml").write_text(rig.replace('"stereo"', '"front"'), encoding="utf-8")
+    for name, options in (("images", ("--fps", "10")), ("calibrated", ())):
+        subprocess.run([Path(program).resolve(), "run", name, "-o", f"{name}_run", "--rig", "rig.yaml", *options, "-q", "--max-frames", "8"],
+                       cwd=folder, check=True, capture_output=True, timeout=120)
+        of_rig = folder / f"{name}_run"
+        (of_rig / "summary.json").unlink()  # as while it goes on
+        with served(program, of_rig) as url:
+            check(json_of(f"{url}/api/run")["has_images"], f"{name}: the run states its recording")
+            status, _, content = get(f"{url}/api/image?frame=3")
+            check(status == 200, f"{name}: {status} {content[:200]}")
+            check(json_of(f"{url}/api/landmarks?frame=3")["tracks"], f"{name}: landmarks")
+    images.rename(folder / "moved")
+    with served(program, folder / "images_run") as url:
+        check(not json_of(f"{url}/api/run")["has_images"], "the recording is not there any more")
+    with served(program, folder / "images_run", "--recording", folder / "moved") as url:
+        check(get(f"{url}/api/image?frame=3")[0] == 200, "it was moved")
+
+
 def check_single_images(program, drive, folder):
     """Frame 5 has the left image alone, frame 9 none."""
     recording, run = folder / "single", folder / "single_run"
@@ -125,8 +177,9 @@ def check_single_images(program, drive, folder):
 
 
 def repeated(run, copy, times):
-    """A copy of a run whose store has its frames so many times, one after the other."""
+    """A copy of a run, without images, whose store has its frames so many times, one after the other."""
     shutil.copytree(run, copy)
+    (copy / "input.yaml").unlink()
     store = sqlite3.connect(copy / "run.sqlite")
     store.execute("PRAGMA synchronous=OFF")
     count, first, last = store.execute("SELECT count(*), min(stamp_ns), max(stamp_ns) FROM frames").fetchone()
@@ -250,6 +303,8 @@ def main():
         tested = with_innovations(run, Path(folder))
         check_innovations(a.program, tested)
         check_recordings_of_live_run(a.program, drive, Path(folder))
+        check_images_before_they_are_listed(a.program, drive, Path(folder))
+        check_run_by_rig(a.program, drive, run, Path(folder))
         check_single_images(a.program, drive, Path(folder))
         check_growing_store(a.program, run, Path(folder))
         check_bad_input(a.program, Path(folder))

@@ -68,7 +68,8 @@ void add_view(CLI::App& app, Context& context) {
   command->add_option("run", a->run, "Run folder; a run may be going on in it.")->required();
   command->add_flag("--follow", a->follow, "Wait for the run to begin (default: it is an error if there is none).");
   command->add_option("--recording", a->recording,
-                      "Recording that was run, for its images (default: as the run states it, or what it records).");
+                      "Recording that was run, for its images (default: as the run states it, or what it records). How "
+                      "it is read is by default as the run has read it, and the calibration is that of the run.");
   add_recording_options(*command, a->reading);
   command->add_option("--port", a->port, "Port to listen at (default 0: any that is free; the address is printed).")
       ->check(CLI::Range(0, 65535));

@@ -6,11 +6,9 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <ranges>
 #include <utility>
-#include <variant>
 
 #include "spartan/core/files.h"
 #include "spartan/image_io/image_io.h"
@@ -36,22 +34,6 @@ std::string version_of(const std::string& store) {
     text += error ? "none;" : fmt::format("{} {};", size, time.time_since_epoch().count());
   }
   return text;
-}
-
-// An empty object before a run has written one.
-Json summary_of(const RunFolder& folder) {
-  const auto text = read_file(folder.summary());
-  Json summary = text ? Json::parse(*text, nullptr, false) : Json::object();
-  return summary.is_object() ? summary : Json::object();
-}
-
-// What the summary of a run states; empty where it is not there.
-std::string input_of(const RunFolder& folder) {
-  const Json summary = summary_of(folder);
-  const std::string input =
-      summary.contains("input") && summary["input"].is_string() ? summary["input"].get<std::string>() : "";
-  std::error_code error;
-  return fs::exists(input, error) ? input : "";
 }
 
 // Number of the last one of so many; 0 where there is none.
@@ -80,8 +62,7 @@ Status RunView::read_settings() {
   rig_ = std::move(*rig);
   options_ = std::move(*options);
   imager_.reset();
-  recordings_.clear();
-  recordings_are_complete_ = false;
+  images_.emplace(folder_, RunInput{request_.recording, request_.open});
   return {};
 }
 
@@ -103,6 +84,7 @@ Status RunView::refresh() {
     frames_.clear();
     terrain_.clear();
     maps_ = 0;
+    last_image_ = -1;
     is_continued = read_added(*store);
     if (!is_continued) return failure(is_continued);
   }
@@ -139,23 +121,28 @@ Result<bool> RunView::read_added(RunStore& store) {
   return true;
 }
 
-// Where a run was resumed the store has more frames than the summary, which is of its first part; where it is just
-// ending the frames that were read here may be fewer.
+// A process that works on the run owns its folder.
 bool RunView::has_ended() const {
-  const Json summary = summary_of(folder_);
-  if (!summary.contains("frames") || !summary["frames"].is_number_unsigned()) return false;
-  auto frames = summary["frames"].get<std::size_t>();
-  if (summary.contains("skipped") && summary["skipped"].is_object()) {
-    for (const auto& [reason, count] : summary["skipped"].items())
-      frames += count.is_number_unsigned() ? count.get<std::size_t>() : 0;
+  return FolderLock::expect_free(folder_.path).has_value();
+}
+
+// The last frame whose images are on disk: those of a live run are written beside its results. -1: none.
+std::int64_t RunView::last_image() {
+  constexpr std::size_t kMost = 300;
+  const std::size_t known = last_image_ < 0 ? 0 : static_cast<std::size_t>(last_image_) + 1;
+  for (std::size_t n = frames_.size(), tried = 0; n > known && tried < kMost; --n, ++tried) {
+    const Frame& frame = frames_[n - 1];
+    if (!images_->has_both(frame.pair, frame.stamp)) continue;
+    last_image_ = static_cast<std::int64_t>(n) - 1;
+    break;
   }
-  return frames_.size() == frames;
+  return last_image_;
 }
 
 Result<std::string> RunView::overview() {
   const std::lock_guard lock(mutex_);
+  const bool ended = has_ended();  // before its last results are read
   if (Status s = refresh(); !s) return failure(s);
-  const bool ended = has_ended();
   Json terrain = Json::array();
   for (const Stamp view : terrain_) {
     const auto frame = std::lower_bound(frames_.begin(), frames_.end(), view,
@@ -169,7 +156,8 @@ Result<std::string> RunView::overview() {
               {"terrain", terrain},
               {"maps", maps_},
               {"map_version", map_version_},
-              {"has_images", !image_sources().empty()},
+              {"has_images", images_->exist()},
+              {"last_image", last_image()},
               {"ended", ended},
               {"generation", generation_}}
       .dump();
@@ -195,64 +183,17 @@ Result<std::string> RunView::map() {
   return map_layers(*saved, kMostCells);
 }
 
-// The one that was named, else those that a live run has recorded, else that of the summary.
-std::vector<RunView::ImageSource> RunView::image_sources() const {
-  OpenOptions open = request_.open;
-  open.unfinished = true;  // the last one of a live run
-  if (!request_.recording.empty()) return {{request_.recording, open}};
-  OpenOptions open_own;
-  open_own.unfinished = true;
-  open_own.pair_tolerance_s = std::numeric_limits<double>::infinity();  // the stream has paired its images
-  std::vector<ImageSource> sources;
-  std::error_code error;
-  for (int number = 1; fs::exists(folder_.recording(number), error); ++number)
-    sources.push_back({folder_.recording(number), open_own, true});
-  if (const std::string input = input_of(folder_); sources.empty() && !input.empty()) sources.push_back({input, open});
-  return sources;
-}
-
-Status RunView::open_recordings() {
-  if (!imager_) {
-    auto imager = Imager::create(rig_, options_.imaging, ThreadPool(1), folder_.path);
-    if (!imager) return failure(imager);
-    imager_ = std::move(*imager);
-  }
-  const std::vector<ImageSource> sources = image_sources();
-  if (sources.empty())
-    return failure(ErrorCode::input, "does not state its recording", folder_.path, "name it by --recording");
-  const bool are_complete = has_ended();
-  std::vector<std::unique_ptr<Recording>> recordings;
-  for (const ImageSource& source : sources) {
-    auto opened = open_recording(source.folder, source.open);
-    // Such as one that was interrupted before it listed a frame.
-    if (!opened && source.is_own && opened.error().code == ErrorCode::input) continue;
-    if (!opened) return failure(opened);
-    recordings.push_back(std::move(*opened));
-  }
-  recordings_ = std::move(recordings);
-  recordings_are_complete_ = are_complete;
-  return {};
-}
-
-Result<StereoFrame> RunView::find_images(const Frame& frame) const {
-  Result<Sample> found = failure(ErrorCode::input, "is not recorded", folder_.path);
-  for (auto recording = recordings_.rbegin(); recording != recordings_.rend() && !found; ++recording)
-    found = (*recording)->sample_at(frame.pair, frame.stamp);
-  if (!found) return failure(found);
-  if (auto* whole = std::get_if<StereoFrame>(&*found)) return std::move(*whole);
-  auto& missing = std::get<MissingFrame>(*found);
-  if (missing.partial) return std::move(*missing.partial);
-  return failure(ErrorCode::input, missing.message);
-}
-
-// One image alone where the other one is missing. A recording that is being made has more frames than when it was
-// opened.
 Result<StereoFrame> RunView::images_of(std::size_t frame) {
   if (frame >= frames_.size()) return no_such("frame", frame, folder_.path);
-  auto found = find_images(frames_[frame]);
-  if (found || recordings_are_complete_) return found;
-  if (Status s = open_recordings(); !s) return failure(s);
-  return find_images(frames_[frame]);
+  return images_->read(frames_[frame].pair, frames_[frame].stamp, rig_);
+}
+
+Status RunView::make_imager() {
+  if (imager_) return {};
+  auto imager = Imager::create(rig_, options_.imaging, ThreadPool(1), folder_.path);
+  if (!imager) return failure(imager);
+  imager_ = std::move(*imager);
+  return {};
 }
 
 // The frame at which the motion to a frame begins; none where no motion was measured.
@@ -283,9 +224,10 @@ Result<std::vector<StereoFrame>> RunView::images_of_motion(std::size_t frame) {
 
 Result<std::string> RunView::image(std::size_t frame) {
   const std::lock_guard lock(mutex_);
+  if (Status s = make_imager(); !s) return failure(s);
   const auto read = images_of(frame);
-  const bool may_follow = frame < frames_.size() && !recordings_are_complete_ && !has_ended();
-  if (!read && may_follow) return std::string();  // not on disk yet
+  const bool may_follow = frame < frames_.size() && static_cast<std::int64_t>(frame) >= last_image() && !has_ended();
+  if (!read && read.error().code == ErrorCode::input && may_follow) return std::string();  // not on disk yet
   if (!read) return failure(read);
   if (read->left.empty()) return no_such("left image of frame", frame, folder_.path);
   const auto pair = imager_->process(*read);
@@ -296,6 +238,7 @@ Result<std::string> RunView::image(std::size_t frame) {
 Result<std::string> RunView::landmarks(std::size_t frame) {
   const std::lock_guard lock(mutex_);
   if (frame >= frames_.size()) return no_such("frame", frame, folder_.path);
+  if (Status s = make_imager(); !s) return failure(s);
   auto odometer = Odometer::create(options_.odometry, ThreadPool(1));
   if (!odometer) return failure(odometer);
   const auto images = images_of_motion(frame);

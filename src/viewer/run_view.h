@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "spartan/camera/recording.h"
 #include "spartan/core/result.h"
 #include "spartan/imaging/imager.h"
 #include "spartan/rig/rig.h"
 #include "spartan/system/run_folder.h"
 #include "spartan/system/run_options.h"
 #include "spartan/system/run_store.h"
+#include "viewer/frame_images.h"
 #include "viewer/view_server.h"
 
 namespace spartan::viewer {
@@ -25,7 +25,8 @@ class RunView {
   static Result<std::unique_ptr<RunView>> open(const ViewRequest& request);
 
   /// JSON: name, numbers of frames, terrain views and local maps, the version of the global map (0: there is none),
-  /// whether the run has ended, and a number that changes where frames that were given before are others now.
+  /// the last frame whose images are on disk, whether the run has ended, and a number that changes where frames that
+  /// were given before are others now.
   Result<std::string> overview();
   /// JSON of FrameColumns, from this number on.
   Result<std::string> frames(std::size_t from);
@@ -47,21 +48,13 @@ class RunView {
     Stamp stamp, motion_from;
     bool has_motion = false;
   };
-  // What is asked for an image.
-  struct ImageSource {
-    std::string folder;
-    OpenOptions open;
-    bool is_own = false;  // the run has recorded it
-  };
-
   explicit RunView(const ViewRequest& request) : request_(request), folder_{request.run} {}
   Status refresh();
   Status read_settings();
   Result<bool> read_added(RunStore& store);
   bool has_ended() const;
-  std::vector<ImageSource> image_sources() const;
-  Status open_recordings();
-  Result<StereoFrame> find_images(const Frame& frame) const;
+  std::int64_t last_image();
+  Status make_imager();
   Result<StereoFrame> images_of(std::size_t frame);
   std::optional<std::size_t> reference_of(std::size_t frame) const;
   Result<std::vector<StereoFrame>> images_of_motion(std::size_t frame);
@@ -77,9 +70,9 @@ class RunView {
   std::vector<Stamp> terrain_;
   std::int64_t maps_ = 0;
   std::int64_t map_version_ = 0;
-  std::int64_t generation_ = 0;                         // how often other records have replaced those that were read
-  std::vector<std::unique_ptr<Recording>> recordings_;  // a live run that was resumed has several
-  bool recordings_are_complete_ = false;                // opened after the run had ended
+  std::int64_t generation_ = 0;  // how often other records have replaced those that were read
+  std::int64_t last_image_ = -1;
+  std::optional<FrameImages> images_;
   std::optional<Imager> imager_;
 };
 

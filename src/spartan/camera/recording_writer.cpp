@@ -108,6 +108,10 @@ std::string format_mismatch(const FrameImage& image, const Camera& camera) {
   return {};
 }
 
+std::string image_stem(const std::string& pair, Stamp left_stamp) {
+  return fmt::format("images/{}/{}", pair, left_stamp.ns);
+}
+
 constexpr const char* kPreviousRowsFile = "/frames.csv.before";
 
 // The complete rows of a frames.csv (its last row may be truncated), by left image.
@@ -309,14 +313,22 @@ Result<RecordingWriter> RecordingWriter::open(const std::string& folder, const R
   return RecordingWriter(std::move(state));
 }
 
-Result<bool> RecordingWriter::reuse_frame(const std::string& pair, Stamp left_stamp) {
-  const std::string stem = fmt::format("images/{}/{}", pair, left_stamp.ns);
-  const auto row = state_->previous_rows.find(stem + "_left.png");
+RecordedImages find_recorded_images(const std::string& folder, const std::string& pair, Stamp left_stamp) {
+  const std::string stem = folder + "/" + image_stem(pair, left_stamp);
+  RecordedImages found;
   std::error_code error;
-  if (row == state_->previous_rows.end() || !fs::exists(state_->folder + "/" + stem + "_left.png", error) ||
-      !fs::exists(state_->folder + "/" + stem + "_right.png", error)) {
-    return false;
+  for (const char* extension : {".pnm", ".png"}) {
+    for (const auto& [path, side] : {std::pair{&found.left, "_left"}, {&found.right, "_right"}}) {
+      if (fs::exists(stem + side + extension, error)) *path = stem + side + extension;
+    }
   }
+  return found;
+}
+
+Result<bool> RecordingWriter::reuse_frame(const std::string& pair, Stamp left_stamp) {
+  const auto row = state_->previous_rows.find(image_stem(pair, left_stamp) + "_left.png");
+  const RecordedImages images = find_recorded_images(state_->folder, pair, left_stamp);
+  if (row == state_->previous_rows.end() || images.left.empty() || images.right.empty()) return false;
   if (Status s = state_->check_stamp(pair, left_stamp); !s) return failure(s);
   state_->last[pair] = left_stamp;
   if (Status s = state_->frames->append(row->second); !s) return failure(s);
@@ -338,7 +350,7 @@ Status RecordingWriter::add_partial(const StereoFrame& frame) {
 
 // Those that are not empty.
 Status RecordingWriter::add_images(const StereoFrame& frame) {
-  const std::string stem = fmt::format("images/{}/{}", frame.pair, frame.left_stamp.ns);
+  const std::string stem = image_stem(frame.pair, frame.left_stamp);
   const char* const extension = state_->images == ImageFiles::png ? ".png" : ".pnm";
   const std::string left = stem + "_left" + extension, right = stem + "_right" + extension;
   for (const auto& [path, image] : {std::pair{&left, &frame.left}, std::pair{&right, &frame.right}}) {

@@ -33,6 +33,14 @@ enum class ImageFiles {
   pnm,  ///< PGM and PPM: twice as large, and written in a tenth of the time
 };
 
+/// Paths of the images of a frame; empty where there is none.
+struct RecordedImages {
+  std::string left, right;
+};
+/// Those in a folder that a RecordingWriter has made, or is making: also of a frame that it has not listed yet, whose
+/// files it may still be writing.
+RecordedImages find_recorded_images(const std::string& folder, const std::string& pair, Stamp left_stamp);
+
 /// Creates the folder and appends samples. Kinds of samples may be interleaved in any order; within a kind (and within
 /// the frames of a pair) stamps must strictly increase. Everything written reads back bit for bit. `add` rejects a
 /// sample with code `input`, and writes nothing of it, where its stamp does not increase, a number is not finite or an

@@ -18,6 +18,7 @@
 #include "spartan/camera/recording.h"
 #include "spartan/camera/recording_writer.h"
 #include "spartan/core/files.h"
+#include "spartan/image_io/image_io.h"
 #include "spartan/testing/temporary_folder.h"
 #include "spartan/testing/tiny_recordings.h"
 
@@ -159,6 +160,10 @@ TEST(BatchedRecording, ListsFramesAtTheNextSync) {
   EXPECT_EQ(listed_frames(path), 2U);
   ASSERT_TRUE(writer.add(tiny_frame(2)));
   EXPECT_EQ(listed_frames(path), 2U);
+  const RecordedImages images = find_recorded_images(path, "stereo", tiny_frame(2).left_stamp);
+  EXPECT_EQ(read_image(images.left)->size(), tiny_frame(2).left.size()) << "before it is listed";
+  EXPECT_TRUE(read_image(images.right));
+  EXPECT_TRUE(find_recorded_images(path, "stereo", Stamp{1}).left.empty());
   ASSERT_TRUE(writer.finish());
   EXPECT_EQ(listed_frames(path), 3U);
 }

@@ -5,7 +5,7 @@
   const hasWebGl = Boolean(document.createElement('canvas').getContext('webgl'));
   if (!hasWebGl) at('scene').textContent = 'This browser does not draw in 3D (WebGL).';
   const scene = hasWebGl ? makeScene(at('scene')) : new Proxy({}, {get: () => () => null}), plots = makePlots(at('plots'), index => show(index));
-  let run = null, frames = null, now = 0, playing = null, mapShown = 0, nextMap = 0, shownView = -1, request = 0;
+  let run = null, frames = null, now = 0, playing = null, mapShown = 0, nextMap = 0, shownView = -1, request = 0, imaged = -1;
   const errors = [];
 
   const get = async (path, kind = 'json') => {
@@ -35,31 +35,45 @@
       context.stroke();
     }
     const agree = data.tracks.filter(t => t[4]).length;
-    at('image-note').textContent = data.tracks.length === 0 ? 'No motion was measured to this frame.'
+    at('image-note').textContent += data.tracks.length === 0 ? 'No motion was measured to this frame.'
       : `${agree} inliers (green), ${data.tracks.length - agree} outliers (orange), and where they were in the frame before.`;
   };
+  // What the server has sent as the image: an address, or, where it has none, why.
+  const loadImage = async index => {
+    const response = await fetch(`/api/image?frame=${index}`);
+    if (!response.ok) throw new Error(await response.text());
+    if (response.status === 204) throw new Error('The image of this frame is not recorded yet.');
+    return URL.createObjectURL(await response.blob());
+  };
+  // While a live run goes on, its newest images may not be recorded yet: the last recorded one is shown, and named.
+  const imageOf = index => !run.ended && run.last_image >= 0 ? Math.min(index, run.last_image) : index;
   const showImage = async index => {
-    const mine = ++request;
+    const mine = ++request, shown = imaged = imageOf(index), image = at('image');
     if (!run.has_images) {
       at('image-note').textContent = 'No images: name the recording by --recording.';
       return;
     }
-    const image = at('image');
-    image.src = `/api/image?frame=${index}`;
-    at('landmarks').width = 1;  // no landmarks of another frame
     try {
+      const source = await loadImage(shown), before = image.src;
+      if (mine !== request) return URL.revokeObjectURL(source);
+      image.src = source;
+      URL.revokeObjectURL(before);
       await image.decode();
     } catch (error) {
       if (mine !== request) return;
-      at('image-note').textContent = 'This frame has no image.';
+      URL.revokeObjectURL(image.src);
+      image.removeAttribute('src');
+      at('landmarks').width = 1;
+      at('image-note').textContent = error.message;
       if (!run.ended) setTimeout(() => mine === request && showImage(index), 1000);  // it may not be on disk yet
       return;
     }
     if (mine !== request) return;
-    at('image-note').textContent = '';
+    at('landmarks').width = 1;  // no landmarks of another frame
+    at('image-note').textContent = shown === index ? '' : `Image of frame ${shown + 1}: later ones are not recorded yet. `;
     if (!at('show-landmarks').checked || playing) return;
     try {
-      const data = await get(`/api/landmarks?frame=${index}`);
+      const data = await get(`/api/landmarks?frame=${shown}`);
       if (mine === request) drawLandmarks(data);
     } catch (error) {
       if (mine === request) at('image-note').textContent = error.message;
@@ -140,11 +154,13 @@
       plots.setFrames(frames);
       if (frames.total > 0) show(first ? (run.ended ? 0 : frames.total - 1) : last ? frames.total - 1 : Math.min(now, frames.total - 1));
       paint();
+    } else if (frames.total > 0 && imageOf(now) !== imaged) {
+      showImage(now);
     }
     at('state').textContent = `${run.frames} frames, ${run.terrain.length} terrain views, ${run.maps} local maps, rig ${run.rig}${run.ended ? '' : '; the run goes on'}`;
     await showMap();
   };
-  // An ended run is asked for until all of it is here.
+  // An ended run, all of which is here, may be resumed.
   const follow = async () => {
     let complete = false;
     try {
@@ -154,7 +170,7 @@
       errors.push(error.message);
       at('state').textContent = `Not answered: ${error.message}`;
     }
-    if (!complete) setTimeout(follow, 1000);
+    setTimeout(follow, complete ? 10000 : 1000);
   };
 
   // ---- controls
@@ -180,6 +196,6 @@
     scene.repaint();
     plots.repaint();
   });
-  window.spartan = {scene, plots, errors, state: () => ({now, total: frames ? frames.total : 0, mapShown})};  // for tests
+  window.spartan = {scene, plots, errors, state: () => ({now, total: frames ? frames.total : 0, mapShown, imaged})};  // for tests
   follow();
 })();
