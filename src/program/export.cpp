@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "program/commands.h"
@@ -30,11 +31,15 @@ Result<ExitCode> list_formats() {
 
 Result<ExitCode> export_images(const Context& context, const ExportArguments& arguments,
                                std::optional<TrajectoryKind> kind, const ThreadPool& workers) {
-  if (Status s = expect_new_folder(context, arguments.output); !s) return failure(s);
   auto options = open_options(arguments.reading);
   if (!options) return failure(options);
   options->unfinished = true;  // what a live run that was killed has recorded
-  auto recording = open_recording(arguments.recording, *options);
+  const auto input = complete_run_input({arguments.recording, std::move(*options)}, RunFolder{arguments.run});
+  if (!input) return failure(input);
+  if (input->recording.empty())
+    return failure(ErrorCode::usage, "needs the images of the recording", "--format colmap", "name it by --recording");
+  if (Status s = expect_new_folder(context, arguments.output); !s) return failure(s);
+  auto recording = open_recording(input->recording, input->open);
   if (!recording) return failure(recording);
   const auto images = export_colmap(arguments.run, **recording, kind, workers, arguments.output);
   if (!images) return failure(images);
@@ -52,11 +57,10 @@ Result<ExitCode> export_command(const Context& context, const ExportArguments& a
   if (!format) return failure(format);
   const auto kind = parse_trajectory_kind(arguments.trajectory);
   const ThreadPool workers(context.threads);
-  if (*format == ExportFormat::colmap && !arguments.recording.empty())
-    return export_images(context, arguments, kind, workers);
+  if (*format == ExportFormat::colmap) return export_images(context, arguments, kind, workers);
   for (const CLI::Option* option : arguments.of_recording) {
     if (option->count() == 0) continue;
-    return failure(ErrorCode::usage, "is of --format colmap with --recording only", option->get_name(), "leave it out");
+    return failure(ErrorCode::usage, "is of --format colmap only", option->get_name(), "leave it out");
   }
   if (Status s = expect_new_file(context, arguments.output); !s) return failure(s);
   if (Status s = export_run(arguments.run, *format, kind, workers, arguments.output); !s) return failure(s);
@@ -81,11 +85,13 @@ void add_export(CLI::App& app, Context& context) {
                    "Trajectory: odometry, slam or localization (default: the last of these that exists), or smoothed.")
       ->check(CLI::IsMember({"odometry", "slam", "localization", "smoothed"}));
   const std::size_t others = command->get_options().size();
-  command->add_option("--recording", a->recording,
-                      "Recording that was run, whose images colmap needs (default: none); of a live run RUN/live/1, "
-                      "and after a resume the next number.");
+  command->add_option(
+      "--recording", a->recording,
+      "Recording that was run, whose images colmap needs (default: as the run states it); of a live run "
+      "RUN/live/1, and after a resume the next number. How it is read is by default as the run has read "
+      "it.");
   command->add_option("--recording-format", a->reading.format, "Its layout, as --format of `run` (default: detected).");
-  command->add_option("--rig", a->reading.rig, "Calibration file of the recording (default: the recording's own).");
+  command->add_option("--rig", a->reading.rig, "Calibration file of the recording (default: that of the run).");
   add_recorded_frames_options(*command, a->reading);
   const std::vector<CLI::Option*> options = command->get_options();
   a->of_recording.assign(options.begin() + static_cast<std::ptrdiff_t>(others), options.end());

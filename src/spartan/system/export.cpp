@@ -28,7 +28,7 @@ constexpr std::array kFormats{
     ExportDescription{"euroc", ExportFormat::euroc, ".csv", "trajectory: stamp in ns, position, quaternion (EuRoC)"},
     ExportDescription{"csv", ExportFormat::csv, ".csv", "trajectory with status, standard deviations and inliers"},
     ExportDescription{"colmap", ExportFormat::colmap, "folder",
-                      "rectified images with their poses (COLMAP text model); needs --recording"},
+                      "rectified images with their poses (COLMAP text model); of a live run by --recording"},
     ExportDescription{"geotiff", ExportFormat::geotiff, ".tif", "global map, all layers (cloud-optimized GeoTIFF)"},
     ExportDescription{"gltf", ExportFormat::gltf, ".glb", "global map as a mesh in the colours of the images (glTF)"},
     ExportDescription{"octomap", ExportFormat::octomap, ".bt", "global map as an octree (OctoMap)"},
