@@ -41,8 +41,8 @@ namespace {
 // Images of a live stream that wait to be processed, at most: some 100 frames of 1120 x 1120 px.
 constexpr std::size_t kQueueBytes = std::size_t{256} << 20U;
 
-// Of the global map, that a live run writes where it is stopped: some 0.4 s.
-constexpr std::int64_t kMostCellsAtOnce = 500'000;
+// Of the global map, that a live run writes where it is stopped: some 0.5 s.
+constexpr std::int64_t kMostCellsAtOnce = 250'000;
 
 // Where the samples come from.
 struct RunSource {
