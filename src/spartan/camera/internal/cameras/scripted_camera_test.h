@@ -122,7 +122,16 @@ class CameraStreamTest : public ::testing::Test {
           if (!script.openable) return failure(ErrorCode::read_error, "is not there", request.names());
           return std::make_unique<ScriptedCamera>(script);
         },
-        options, Log::to_function([this](LogLevel, std::string_view text) { said.emplace_back(text); }));
+        options, Log::to_function([this](LogLevel, std::string_view text) {
+          const std::lock_guard lock(said_mutex_);
+          said_.emplace_back(text);
+        }));
+  }
+
+  // What the threads of the streams have logged since the last call.
+  std::vector<std::string> take_said() {
+    const std::lock_guard lock(said_mutex_);
+    return std::exchange(said_, {});
   }
 
   // While images come, of which a busy computer notices some pairs too far apart.
@@ -149,9 +158,12 @@ class CameraStreamTest : public ::testing::Test {
 
   std::map<std::string, Script> scripts;
   Script &left_script = scripts["left"], &right_script = scripts["right"];
-  std::vector<std::string> said;
   std::chrono::milliseconds first_wait{500}, pair_wait{100};
   std::function<bool()> should_stop;
+
+ private:
+  std::mutex said_mutex_;
+  std::vector<std::string> said_;
 };
 
 }  // namespace spartan::internal
