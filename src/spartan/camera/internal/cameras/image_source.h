@@ -42,8 +42,10 @@ class ImageSource {
   /// An image of the camera `side` of the request. Called by the thread of the source.
   using Deliver = std::function<void(int side, StampedImage image)>;
 
-  /// Borrows the clock. Errors: those of `open`, but for Opening::later, which goes on trying like after a loss.
+  /// Where a device cannot be opened at first. now: that is an error; later: it is tried again and again, as after a
+  /// loss.
   enum class Opening { now, later };
+  /// Borrows the clock. Errors: those of `open`, with Opening::now.
   static Result<std::unique_ptr<ImageSource>> create(DeviceRequest request, OpenDevice open, const HostClock& clock,
                                                      const Log& log, Opening opening = Opening::now);
   ~ImageSource();
