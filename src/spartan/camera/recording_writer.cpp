@@ -255,7 +255,7 @@ Result<RecordingWriter> RecordingWriter::resume(const std::string& folder, const
   std::map<std::string, std::string> rows;
   FolderLock lock;
   if (fs::exists(folder + "/frames.csv", error)) {
-    auto acquired = FolderLock::acquire(folder);
+    auto acquired = FolderLock::acquire(folder, FolderLock::kOfKilledProcess);
     if (!acquired) return failure(acquired);
     lock = std::move(*acquired);
     remove_temporary_files_below(folder);

@@ -97,8 +97,15 @@ Status make_folder(const std::string& path);
 /// process. The lock ends with the process, however that ends. The file is removed with the value.
 class FolderLock {
  public:
-  /// Codes: `output` if another process owns the folder (its id is named) or the file cannot be written, `resources`.
-  static Result<FolderLock> acquire(const std::string& folder);
+  /// The `wait` of those who go on with the work of a killed process: it owns the folder until the system has taken
+  /// back its memory, which takes a while on a busy computer.
+  static constexpr std::chrono::milliseconds kOfKilledProcess{2000};
+
+  /// Waits for `wait` at most while another process owns the folder. The caller looks into the folder again after it
+  /// has waited. Codes: `output` if the other process still owns it (its id is named) or the file cannot be written,
+  /// `resources`.
+  static Result<FolderLock> acquire(const std::string& folder,
+                                    std::chrono::milliseconds wait = std::chrono::milliseconds(40));
   /// The error of acquire() if another process owns the folder; nothing if none does. Changes nothing in the folder.
   /// An empty folder is watched for half a second: the process that created it may be about to lock it.
   static Status expect_free(const std::string& folder);

@@ -95,10 +95,10 @@ Status FolderLock::expect_free(const std::string& folder) {
   return {};
 }
 
-Result<FolderLock> FolderLock::acquire(const std::string& folder) {
-  constexpr int kLocks = 5;  // expect_free() of another process may hold its lock for a moment
+Result<FolderLock> FolderLock::acquire(const std::string& folder, std::chrono::milliseconds wait) {
   const std::string path = folder + kLockFile;
-  for (int refused = 0;;) {
+  const auto end = std::chrono::steady_clock::now() + wait;
+  for (;;) {
     const int descriptor = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
     if (descriptor < 0) return write_failure(path, errno);
     FolderLock lock(descriptor, "");  // removes nothing yet
@@ -106,7 +106,8 @@ Result<FolderLock> FolderLock::acquire(const std::string& folder) {
     do {
       error = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 ? 0 : errno;
     } while (error == EINTR);
-    if (error == EWOULDBLOCK && ++refused < kLocks) {
+    // The lock may be that of expect_free() of another process, which ends in a moment.
+    if (error == EWOULDBLOCK && std::chrono::steady_clock::now() < end) {
       std::this_thread::sleep_for(kPause);
       continue;
     }

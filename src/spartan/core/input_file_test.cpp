@@ -149,6 +149,20 @@ TEST(FolderLock, AnOwnerThatIsAboutToEndIsNamedToo) {
   EXPECT_THAT(second.error().what, HasSubstr("(id 4711)"));
 }
 
+TEST(FolderLock, AKilledOwnerIsWaitedFor) {
+  const TemporaryFolder folder;
+  const std::string path = folder.path() + "/owner.lock";
+  const int owner = ::open(path.c_str(), O_RDWR | O_CREAT, 0644);
+  ASSERT_EQ(::flock(owner, LOCK_EX | LOCK_NB), 0);
+  std::thread ends([owner] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    ::close(owner);
+  });
+  const auto lock = FolderLock::acquire(folder.path(), FolderLock::kOfKilledProcess);
+  ends.join();
+  EXPECT_TRUE(lock) << lock.error().message();
+}
+
 TEST(FolderLock, TheProcessThatCreatedTheFolderIsWaitedFor) {
   const TemporaryFolder folder;
   std::optional<FolderLock> lock;

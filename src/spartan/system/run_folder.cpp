@@ -51,7 +51,8 @@ Result<OwnedRunFolder> prepare_run_folder(const RunFolder& folder, bool resume) 
     if (Status free = resume ? Status() : FolderLock::expect_free(folder.path); !free) return failure(free);
     if (Status usable = check_run_folder(folder, resume); !usable) return failure(usable);
   }
-  auto lock = FolderLock::acquire(folder.path);
+  auto lock =
+      resume ? FolderLock::acquire(folder.path, FolderLock::kOfKilledProcess) : FolderLock::acquire(folder.path);
   if (!lock) return failure(lock);
   // Another process with --resume may have been the first to lock the folder that this one created.
   std::error_code error;
