@@ -97,9 +97,9 @@ Status make_folder(const std::string& path);
 /// process. The lock ends with the process, however that ends. The file is removed with the value.
 class FolderLock {
  public:
-  /// The `wait` of those who go on with the work of a killed process: it owns the folder until the system has taken
-  /// back its memory, which takes a while on a busy computer.
-  static constexpr std::chrono::milliseconds kOfKilledProcess{2000};
+  /// The `wait` of those who go on with the work of a killed process: it owns the folder until its write to the disk
+  /// has returned and each of its threads had its turn, which takes seconds on a busy computer.
+  static constexpr std::chrono::milliseconds kOfKilledProcess{10000};
 
   /// Waits for `wait` at most while another process owns the folder. The caller looks into the folder again after it
   /// has waited. Codes: `output` if the other process still owns it (its id is named) or the file cannot be written,
