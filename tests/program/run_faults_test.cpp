@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <future>
 #include <nlohmann/json.hpp>
+#include <thread>
+#include <utility>
 
 #include "program.h"
 #include "run_results.h"
@@ -70,6 +73,18 @@ TEST_F(RunFaults, OnlyOneProcessWorksOnAFolder) {
   ASSERT_EQ(run("out", {"--resume"}).exit_code, 0) << "the lock ends with its owner";
   EXPECT_EQ(byte_stable_content(path("out")), expected_content());
   EXPECT_FALSE(fs::exists(path("out/owner.lock")));
+}
+
+TEST_F(RunFaults, ResumeWaitsForTheEndOfAKilledProcess) {
+  ASSERT_EQ(run("out", {"--max-frames", "2"}).exit_code, 0);
+  auto lock = FolderLock::acquire(path("out"));
+  ASSERT_TRUE(lock) << lock.error().message();
+  auto resumed = std::async(std::launch::async, [&] { return run("out", {"--resume"}); });
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  { const FolderLock released = std::move(*lock); }
+  const ProgramResult result = resumed.get();
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(byte_stable_content(path("out")), expected_content());
 }
 
 TEST_F(RunFaults, ConcurrentProcessesNeverWriteAFrameTwice) {

@@ -106,9 +106,10 @@ class FolderLock {
   /// `resources`.
   static Result<FolderLock> acquire(const std::string& folder,
                                     std::chrono::milliseconds wait = std::chrono::milliseconds(40));
-  /// The error of acquire() if another process owns the folder; nothing if none does. Changes nothing in the folder.
-  /// An empty folder is watched for half a second: the process that created it may be about to lock it.
-  static Status expect_free(const std::string& folder);
+  /// The error of acquire() if another process owns the folder for longer than `wait`; nothing if none does. Changes
+  /// nothing in the folder. An empty folder is watched for half a second: the process that created it may be about to
+  /// lock it.
+  static Status expect_free(const std::string& folder, std::chrono::milliseconds wait = std::chrono::milliseconds(0));
 
   FolderLock() = default;  ///< owns nothing
   FolderLock(FolderLock&& other) noexcept;

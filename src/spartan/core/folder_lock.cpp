@@ -78,17 +78,23 @@ Status write_owner(int descriptor, const std::string& path) {
 
 }  // namespace
 
-Status FolderLock::expect_free(const std::string& folder) {
+Status FolderLock::expect_free(const std::string& folder, std::chrono::milliseconds wait) {
   const std::string path = folder + kLockFile;
-  for (int i = 0; i < kTries; ++i) {
+  const auto end = std::chrono::steady_clock::now() + wait;
+  for (int i = 0; i < kTries;) {
     const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     if (descriptor < 0 && has_content(folder)) return {};
     if (descriptor >= 0) {
       const FolderLock opened(descriptor, "");
       // A shared lock is refused by an exclusive one; it ends with `opened`.
-      if (::flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK) return in_use(folder, descriptor);
+      if (::flock(descriptor, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+        if (std::chrono::steady_clock::now() >= end) return in_use(folder, descriptor);
+        std::this_thread::sleep_for(kPause);
+        continue;
+      }
       if (!id_in(descriptor).empty()) return {};  // left by a process that was killed
     }
+    ++i;
     // Another process has created the folder or the file, and is about to lock it.
     std::this_thread::sleep_for(kPause);
   }

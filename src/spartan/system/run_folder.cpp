@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <filesystem>
 #include <string_view>
 #include <utility>
@@ -33,7 +34,8 @@ Status check_run_folder(const RunFolder& folder, bool resume) {
   if (!fs::is_directory(folder.path, error))
     return failure(ErrorCode::output, "is not a folder", folder.path, "choose another folder with -o");
   if (fs::is_empty(folder.path, error)) return {};
-  if (Status free = FolderLock::expect_free(folder.path); !free) return failure(free);
+  const auto wait = resume ? FolderLock::kOfKilledProcess : std::chrono::milliseconds(0);
+  if (Status free = FolderLock::expect_free(folder.path, wait); !free) return failure(free);
   return resume ? Status() : already_exists(folder);
 }
 
