@@ -8,6 +8,7 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+from colour_vision import closest
 from view_requests import check, json_of, owned, served
 
 VENV_PYTHON = Path(__file__).resolve().parent.parent / ".venv/bin/python3"  # made by ./setup
@@ -147,6 +148,31 @@ def check_accessibility(page, name):
     check(not serious, f"{name}: axe-core finds {serious}")
 
 
+def check_trajectory_colours(page, name):
+    """Two of them on one terrain are told apart by colour alone: 10 is seen at a glance, of thin lines more is needed."""
+    colours = page.evaluate("""() => Object.fromEntries([...document.querySelectorAll('#scene-legend .key')]
+      .filter(key => key.querySelector('.swatch') && !key.textContent.startsWith('ellipses'))
+      .map(key => [key.textContent, getComputedStyle(key.querySelector('.swatch')).backgroundColor]))""")
+    check(set(colours) >= {"odometry", "slam", "localization"}, f"{name}: the legend names {list(colours)}")
+    difference, one, other, vision = closest(colours)
+    check(difference > 15, f"{name}: {one} and {other} differ by {difference:.0f} only ({vision})")
+
+
+def check_state_heights(page):
+    """States differ by the height of their bars, too."""
+    heights = page.evaluate("""async () => {
+      const frames = await (await fetch('/api/frames?from=0')).json(), states = ['tracking', 'degraded', 'lost', 'missing'];
+      spartan.plots.setTime(0);
+      spartan.plots.setFrames({...frames, status: frames.status.map((_, i) => states[Math.floor(4 * i / frames.total)])});
+      const canvas = document.querySelector('.plot.strip canvas'), context = canvas.getContext('2d');
+      return states.map((_, i) => {
+        const x = Math.round((i + 0.5) / 4 * canvas.width), data = context.getImageData(x, 0, 1, canvas.height).data;
+        return data.filter((v, k) => k % 4 === 3 && v > 200).length / canvas.height;
+      });
+    }""")
+    check(all(a > b + 0.1 for a, b in zip(heights, heights[1:])), f"heights of the states: {heights}")
+
+
 def take_screenshot(page, path, width):
     page.evaluate("() => { const t = document.getElementById('time'); t.value = Math.floor(0.6 * t.max); t.dispatchEvent(new Event('input')); }")
     page.evaluate("() => { document.querySelector('footer').style.position = 'static'; }")  # at the end of the whole page
@@ -189,6 +215,8 @@ def check_in_browser(program, run, recording, screenshots):
             for scheme in ("light", "dark"):
                 with browser.page(width, scheme) as page:
                     check_accessibility(page, f"{width} px, {scheme}")
+                    page.wait_for_function("() => spartan.scene.state().vertices > 0")
+                    check_trajectory_colours(page, f"{width} px, {scheme}")
                     if scheme == "light":
                         check_page(page, width)
                 if screenshots:
@@ -204,6 +232,7 @@ def check_in_browser(program, run, recording, screenshots):
             check(moving <= every and page.evaluate(triangles) == every, f"at rest the terrain has its {every} triangles again")
             show = page.evaluate(STEPS)
             clear = page.evaluate(CLEAR)
+            check_state_heights(page)
             check_long_drive(page)
             state = page.evaluate("() => [spartan.state().total, spartan.scene.state().vertices]")
             print(f"{state[0]} frames, {state[1]} vertices: turning the scene {sum(times[-40:]) / 40:.1f} ms a frame (mean of the last "

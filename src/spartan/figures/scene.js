@@ -9,7 +9,8 @@
   const kClasses = [[150, 150, 150], [120, 190, 165], [213, 94, 0], [0, 114, 178]];
   const kUnknown = [170, 165, 160];
   const kSteps = [1, 2, 4, 8];  // cells between the vertices of the terrain's levels of detail
-  const kTrajectories = {odometry: '--orange', slam: '--light-blue', localization: '--blue', smoothed: '--purple'};
+  // These differ for readers without red or green cones, too: a light blue does not differ from the blue.
+  const kTrajectories = {odometry: '--orange', slam: '--ink', localization: '--blue', smoothed: '--purple'};
 
   const ramp = value => {
     const at = Math.min(Math.max(value, 0), 1) * (kRamp.length - 1), low = Math.min(Math.floor(at), kRamp.length - 2), part = at - low;

@@ -2,9 +2,10 @@
 // Plots over the frames, on canvases of their own: makePlots(element, onTime) returns {setFrames, setTime}.
 (() => {
   const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  // Colour, and part of the height: orange and red are alike for readers without red or green cones.
   const kStates = {
-    tracking: '--green', ok: '--green', stationary: '--light-blue', standing: '--light-blue', degraded: '--orange', suspect: '--orange',
-    lost: '--red', excluded: '--red', missing: '--soft'};
+    tracking: ['--green', 1], ok: ['--green', 1], stationary: ['--light-blue', 1], standing: ['--light-blue', 1],
+    degraded: ['--orange', 0.65], suspect: ['--orange', 0.65], lost: ['--red', 0.35], excluded: ['--red', 0.35], missing: ['--soft', 0.2]};
   const number = value => value === null || value === undefined ? '–' : String(+value.toPrecision(3));
 
   // The largest of each pixel column, so that 10 000 frames are as many lines as there are pixels.
@@ -73,8 +74,9 @@
         let end = i + 1;
         while (end < count && states[end] === states[i]) ++end;
         if (states[i] !== null) {
-          context.fillStyle = css(kStates[states[i]] || '--soft');
-          context.fillRect(i / count * width, 0, Math.max(1, (end - i) / count * width), height);
+          const [colour, part] = kStates[states[i]] || kStates.missing, high = Math.round(part * height);
+          context.fillStyle = css(colour);
+          context.fillRect(i / count * width, height - high, Math.max(1, (end - i) / count * width), high);
         }
         i = end;
       }
