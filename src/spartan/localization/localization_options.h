@@ -210,11 +210,10 @@ struct WheelOdometryOptions {
             "short distances.",
             between(1e-6, 1));
     v.renamed("longest_step_s", "max_step_s");
-    v.field(
-        "max_step_s", max_step_s,
-        "Longest interval between two updates by the wheels in seconds (each stereo frame is an update); raising it "
-        "gives fewer updates over longer distances.",
-        between(0.1, 100));
+    v.field("max_step_s", max_step_s,
+            "Longest interval between two updates by the wheels in seconds (a stereo frame ends one, too); raising it "
+            "gives fewer updates over longer distances.",
+            between(0.1, 100));
     v.field("slip_alarm", slip_alarm,
             "Slip (1 - travelled / counted) beyond which the summary of a run has an alarm; raising it reports fewer "
             "places where the wheels spin.",

@@ -37,6 +37,12 @@ LocalizationOptions wheel_options() {
   return options;
 }
 
+// Of the position; the perturbation is in the body frame.
+Eigen::Matrix3d in_world(const UncertainPose& pose) {
+  const Eigen::Matrix3d rotation = pose.pose.rotation_matrix();
+  return rotation * pose.covariance.topLeftCorner<3, 3>() * rotation.transpose();
+}
+
 UncertainPose end_of(const TestDrive& drive, double seconds, const LocalizationOptions& options) {
   return driven(options, turning_wheels(drive, seconds)).estimate().world_from_body;
 }
@@ -90,6 +96,30 @@ TEST(LocalizerWheels, RotationIsAsUncertainAsTheWheels) {
   const double forward = std::hypot(options.wheels.min_sigma_m, options.wheels.forward_sigma_ratio * length);
   const double yaw = std::sqrt(2.0) * forward / kTrack_m;  // of two wheels with that error each
   EXPECT_NEAR(std::sqrt(end_of(straight, 3.5, options).covariance(5, 5)), yaw, 0.02 * yaw);
+}
+
+// Vision is lost from 30 s on, and frames still come. Steps that ended with each frame were too short to be measured.
+TEST(LocalizerWheels, MeasureAtEveryRateOfFrames) {
+  const TestDrive drive;
+  constexpr double kEnd_s = 60;
+  for (const double period : {1.5, 0.5, 0.1, 0.05}) {
+    std::vector<Measurement> motions;
+    for (double t = 2.5; t + period < kEnd_s; t += period) {
+      RelativeMotion m = drive.motion(t, t + period, test_motion_covariance());
+      m.measured = m.to < test_stamp(30);
+      motions.emplace_back(m);
+    }
+    const auto samples = test_samples(drive, kEnd_s, {}, 4);
+    const auto at_58 = driven(test_options(), in_order(samples, motions)).estimate_at(test_stamp(58));
+    ASSERT_TRUE(at_58) << period;
+    const Eigen::Vector3d error = at_58->world_from_body.pose.translation() - drive.at(58).translation();
+    EXPECT_LT(error.norm(), 0.015 * (drive.travelled(58) - drive.travelled(30))) << period;
+    const Eigen::Matrix3d covariance = in_world(at_58->world_from_body);
+    EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 14.2) << period;  // chi-square of 3, 99.7 %
+    ASSERT_TRUE(at_58->slip) << period;
+    EXPECT_NEAR(at_58->slip->slip, 0.02, 3 * at_58->slip->sigma) << period;
+    EXPECT_LT(at_58->slip->sigma, 0.11) << period;
+  }
 }
 
 }  // namespace

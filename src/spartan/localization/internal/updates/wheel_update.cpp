@@ -1,5 +1,6 @@
 #include "spartan/localization/internal/updates/wheel_update.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "spartan/localization/internal/updates/filter_correction.h"
@@ -8,11 +9,19 @@
 namespace spartan::internal {
 namespace {
 
-/// Shorter steps are not measured; steps longer than this many max_step_s have no meaningful mean attitude.
-constexpr double kMinStep_s = 0.2, kMaxSteps = 4;
+/// Steps longer than this many max_step_s have no meaningful mean attitude.
+constexpr double kMaxSteps = 4;
+/// A step goes on over frames while it is shorter than kMinStep_s, or shorter than kSlowStep_s and kMinStep_m: the
+/// error of a step is independent of those before it, which many short ones are not.
+constexpr double kMinStep_s = 0.2, kSlowStep_s = 1, kMinStep_m = 0.05;
 /// A step whose length is known with less than this ratio of the wheels' standard deviation updates their scale only:
 /// slip is correlated over many steps, and its sum would otherwise be absorbed by the drift states of vision.
 constexpr double kKnownRatio = 0.5;
+
+bool is_short(const WheelSample& from, const WheelSample& to, double seconds) {
+  const double distance = std::max(std::abs(to.left_m - from.left_m), std::abs(to.right_m - from.right_m));
+  return seconds < kMinStep_s || (seconds < kSlowStep_s && distance < kMinStep_m);
+}
 
 }  // namespace
 
@@ -47,9 +56,10 @@ void WheelUpdate::end_step_at_frame(FilterMemory& memory, Stamp stamp, bool visi
   const double seconds = seconds_between(memory.step.from, stamp);
   // A step that began after the last frame adds nothing to a motion that vision alone has measured.
   const bool redundant = vision_alone && memory.vision.wheels_in_prediction;
-  if (wheels && !redundant && memory.step.has_wheels && seconds >= kMinStep_s &&
-      seconds <= kMaxSteps * options_.max_step_s)
-    update_by_step(memory, *wheels);
+  if (wheels && !redundant && memory.step.has_wheels) {
+    if (is_short(memory.step.wheels, *wheels, seconds)) return;
+    if (seconds <= kMaxSteps * options_.max_step_s) update_by_step(memory, *wheels);
+  }
   begin_step(memory, wheels);
 }
 

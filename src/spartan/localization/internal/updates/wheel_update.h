@@ -15,8 +15,8 @@ class WheelUpdate {
   /// The memory must be that of the time of the sample. Steps end after WheelOdometryOptions::max_step_s.
   void update(FilterMemory& memory, const WheelSample& sample) const;
 
-  /// Steps end with frames, too, so that vision and wheels measure the same motion. `vision_alone`: it was not
-  /// predicted by an IMU, and vision has measured it.
+  /// Steps end with frames, too, so that vision and wheels measure the same motion; at a high rate of frames not with
+  /// each. `vision_alone`: it was not predicted by an IMU, and vision has measured it.
   void end_step_at_frame(FilterMemory& memory, Stamp stamp, bool vision_alone) const;
 
  private:
